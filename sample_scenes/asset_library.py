@@ -26,9 +26,11 @@ from sample_scenes.four_legged import WALK, go_on_four_legs
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Walker, addon
-from softground_addon.blender.after import debris_shapes
-from softground_addon.blender.ground import materials, weather
+from softground_addon.blender.debris import debris_shapes
+from softground_addon.blender.materials import materials
+from softground_addon.blender.weather import ground_weather as weather
 from softground_addon.core.ground import presets
+from softground_addon.core.ground.surfaces import SURFACES
 
 OUTPUT = Path(__file__).parents[1] / "build" / "assets"
 BLEND, CATALOGUES = "softground_assets.blend", "blender_assets.cats.txt"
@@ -114,7 +116,7 @@ def build(scene: bpy.types.Scene) -> None:
             _take(collection, scene, camera, picture)
             for thing in things:
                 thing.hide_render = True
-        for surface in presets.SURFACES:
+        for surface in SURFACES.values():
             shapes = debris_shapes.collection_of(surface)
             scene.collection.children.link(shapes)
             apart = 1.1 * max(max(piece.dimensions) for piece in shapes.objects)
@@ -127,9 +129,9 @@ def build(scene: bpy.types.Scene) -> None:
             for piece in shapes.objects:
                 piece.location, piece.hide_render = (0.0, 0.0, 0.0), True
             scene.collection.children.unlink(shapes)
-            material = materials.ensure_material(surface)
+            material = materials.ensure_material(surface.name)
             _mark(material, "Materials", "Follows the prints of a bake, and lies still on any other mesh")
-            _show(material, next(presets.FOLDER.glob(f"{_file_of(surface)}.png")))
+            _show(material, next(presets.FOLDER.glob(f"{_file_of(surface.name)}.png")))
         for thing in scene.objects:
             thing.hide_render = False
     bpy.ops.outliner.orphans_purge(do_recursive=True)

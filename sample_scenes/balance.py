@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from sample_scenes.motion import Array, BodyMotion, Skeleton, joint_paths
-from softground_addon.core.loads.centre_of_mass import centre_of_mass
+from softground_addon.core.dynamics.centre_of_mass import centre_of_mass
 from softground_addon.core.motion.motion import CharacterMotion
 
 GRAVITY = 9.81  # m/s²

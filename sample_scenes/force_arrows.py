@@ -18,8 +18,8 @@ from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.blender.interface import overlay_shapes
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.viewport import overlay_shapes
 from softground_addon.core.loads.estimate import CharacterLoads
 
 CELL_SIZE = 0.0075  # m

@@ -23,7 +23,9 @@ from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.run import Run, run
 from sample_scenes.snowshoe import ON_SNOWSHOES, put_on_snowshoes
-from softground_addon.blender.ground.materials import BLEND, ensure_blend
+from softground_addon.blender.materials import materials
+from softground_addon.blender.shader_graph import Graph
+from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.01  # m
@@ -33,6 +35,8 @@ LOW, HIGH = np.array((-3.4, -8.0)), np.array((4.2, 1.4))  # m
 BORDER = -3.6  # m; snow before it, sand beyond
 PICTURE = (896, 504)
 
+SAND = "sand"
+"""Attribute of the ground: how much of it is sand, not snow."""
 SAND_STIFFNESS = 6.0  # times that of snow: 2.25 MPa over 0.375 (the paper, Table 1)
 SAND_RIM = 10.0  # Poisson's ratio 0.5 over 0.05
 
@@ -81,16 +85,36 @@ def motions(rate: float) -> dict[str, tuple[Body, BodyMotion]]:
     }
 
 
+def snow_to_sand() -> bpy.types.Material:
+    """The add-on's snow with its sand over it, where there is some."""
+    material = materials.ensure_material("snow").copy()  # which follows no preset
+    material.name = "Snow to Sand"
+    del material[materials.MARK]
+    tree = material.node_tree
+    graph, output = Graph(tree), tree.get_output_node("ALL")
+    ground = materials.ground_of(graph)
+    shader, height = materials.shaded(graph, SURFACES["sand"], ground)
+    drift = graph.noise(ground.place, 0.35, 4.0, 0.6) * 0.5  # no border is drawn with a ruler
+    factor = graph.ramp(graph.attribute(SAND) + drift, 0.70, 0.80)
+    mixed = graph.node("ShaderNodeMixShader", {0: factor, 2: shader})
+    relief = graph.node("ShaderNodeMix", {0: factor, 3: height})
+    displaced = output.inputs["Displacement"].links[0].from_node
+    for node, number, into in ((mixed, 1, output.inputs["Surface"]), (relief, 2, displaced.inputs["Height"])):
+        tree.links.new(into.links[0].from_socket, node.inputs[number])
+        tree.links.new(node.outputs[0], into)
+    return material
+
+
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Landscape:
     """Ground, characters, one bake."""
     painted = {
         "softground_stiffness": lambda x, y: 1 + (SAND_STIFFNESS - 1) * sand(x, y),
         "softground_rim_factor": lambda x, y: 1 + (SAND_RIM - 1) * sand(x, y),
-        BLEND: sand,
+        SAND: sand,
     }
     x, y = (terrain.spaced(LOW[axis], HIGH[axis], SPACING) for axis in (0, 1))
     ground = terrain.add_terrain("Landscape", x, y, height, "snow", scene.collection, painted)
-    ground.data.materials[0] = ensure_blend("snow", "sand")
+    ground.data.materials[0] = snow_to_sand()
     scene.frame_start, scene.frame_end = 1, FRAMES
     walkers, bodies = {}, {}
     for name, (body, motion) in motions(scene.render.fps).items():

@@ -1,6 +1,6 @@
 """`make scenes`: builds every sample scene with its pictures, each in a process of its own, into build/scenes.
 
-python -m sample_scenes.make_all [heroes] [options of the scenes]
+python -m sample_scenes.make_all [options of the scenes]
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 
 SCENES = (
     "landscape",
@@ -15,7 +16,6 @@ SCENES = (
     "walk_forces",
     "craters",
     "four_grounds",
-    "relief",
     "response_hill",
     "crossing",
     "four_legs",
@@ -25,28 +25,14 @@ SCENES = (
 )
 """Modules of this package that `production.run` knows how to run, in the order of the paper's figures."""
 
-HEROES = (
-    "snow_at_dusk",
-    "path_after_rain",
-    "tyre_and_boot",
-    "dune_runner",
-    "powder_runner",
-    "bare_feet",
-    "fox_in_powder",
-    "before_after",
-    "time_lapse",
-)
-"""Scenes out of doors, whose pictures take minutes."""
 
-
-def main(arguments: list[str]) -> int:
-    """Run all scenes, or all heroes, also those after one that failed; returns the number of failures."""
+def build_all(package: str, names: Sequence[str], arguments: Sequence[str]) -> int:
+    """Run scenes of a package, also those after one that failed; returns the number of failures."""
     results = {}
-    heroes = arguments[:1] == ["heroes"]
-    for name in HEROES if heroes else SCENES:
+    for name in names:
         print(f"--- {name}", flush=True)
         started = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", f"sample_scenes.{name}", *arguments[heroes:]], check=False)
+        done = subprocess.run([sys.executable, "-m", f"{package}.{name}", *arguments], check=False)
         results[name] = done.returncode, time.perf_counter() - started
     print(f"\n{'scene':<20}{'time':>8}")
     for name, (code, seconds) in results.items():
@@ -55,4 +41,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(build_all("sample_scenes", SCENES, sys.argv[1:]))

@@ -6,7 +6,7 @@ A scene is a module with three functions, called in this order:
 - `claims(built)` measures what the paper's figure promises;
 - `shoot(built, folder, samples)` lights it and takes its pictures.
 
-    python -m sample_scenes.NAME [--output DIR] [--set PATH=VALUE ...] [--samples N] [--no-pictures]
+    python -m PACKAGE.NAME [--output DIR] [--set PATH=VALUE ...] [--samples N] [--no-pictures]
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import jobs, settings
+from softground_addon.blender import jobs, setting_paths
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import character_setup
 from softground_addon.blender.ground import baked_ground
@@ -179,7 +179,7 @@ def bake(
             character_setup.add_object_contacts(scene, shot.characters[-1], walker.held)
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
-        settings.assign(shot, path, value)
+        setting_paths.assign(shot, path, value)
     if ground is None and write:
         bpy.ops.object.select_all(action="DESELECT")  # a selected mesh would be taken as the ground
         bpy.ops.softground.create_ground()
@@ -230,8 +230,9 @@ def invariants(bake: Bake) -> list[Claim]:
 
 def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
     """Build a scene, check its claims, save it and take its pictures; returns the exit code of the process."""
-    name = Path(str(module.__file__)).stem
-    options = _parser(name, str(module.__doc__)).parse_args(arguments)
+    path = Path(str(module.__file__))
+    name = path.stem
+    options = _parser(f"{path.parent.name}.{name}", str(module.__doc__)).parse_args(arguments)
     started = time.perf_counter()
     folder: Path = options.output
     folder.mkdir(parents=True, exist_ok=True)
@@ -257,8 +258,8 @@ def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
     return 0 if all(claim.holds for claim in claims) else 3
 
 
-def _parser(name: str, description: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=f"python -m sample_scenes.{name}", description=description.splitlines()[0])
+def _parser(command: str, description: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=f"python -m {command}", description=description.splitlines()[0])
     parser.add_argument("--output", type=Path, default=OUTPUT, metavar="DIR")
     parser.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of SoftGround")

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.blender.ground.materials import ensure_material
+from softground_addon.blender.materials.materials import ensure_material
 
 Array = NDArray[np.float64]
 Field = Callable[[Array, Array], Array]

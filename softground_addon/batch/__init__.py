@@ -1,1 +1,1 @@
-"""Many shots, side by side: which, what is done, and the processes that bake them. Knows no Blender."""
+"""Many shots, side by side: their manifest, the finished ones, and the processes that bake them. Knows no Blender."""

@@ -23,7 +23,7 @@ PROGRESS_STYLES = ("plain", "json", "openjd", "none")
 """Lines for people, a JSON object a line, OpenJD's messages, or nothing."""
 
 FIRST_ESTIMATE = 0.1
-"""Share of a bake from which on its pace says something of the time left."""
+"""Share of a bake from which on its pace gives an estimate of the remaining time."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def bake_batch(
     manifest.check_places(
         all_shots,
         f"Manifest '{options.manifest}'",
-        kept={options.manifest: "the manifest"} | workplace.files(all_shots),
+        protected={options.manifest: "the manifest"} | workplace.files(all_shots),
         report=options.report or workplace.report,
     )
     if options.report:
@@ -147,7 +147,7 @@ def _report(path: Path, made_by: str, outcomes: Sequence[Outcome], seconds: floa
 
 
 class _Show:
-    """Progress of every shot and of the whole, with the time left."""
+    """Progress of every shot and of the whole, with the remaining time."""
 
     def __init__(self, style: str, count: int, jobs: int) -> None:
         self._style = style
@@ -176,7 +176,7 @@ class _Show:
             self._plain(event)
 
     def _seconds_left(self) -> float | None:
-        """Of the whole batch, from what its shots took so far; None before the first has ended."""
+        """Remaining time of the whole batch [s], by the time of its shots so far; None before the first has ended."""
         if not self._seconds:
             return None
         mean = sum(self._seconds) / len(self._seconds)
@@ -189,8 +189,8 @@ class _Show:
             said |= {"stage": event.stage, "fraction": event.fraction, "seconds_left": round(event.seconds_left, 1)}
         else:
             said |= {"status": event.status, "message": event.message}
-        left = self._seconds_left()
-        return said | {"batch_seconds_left": None if left is None else round(left, 1)}
+        remaining = self._seconds_left()
+        return said | {"batch_seconds_left": None if remaining is None else round(remaining, 1)}
 
     def _plain(self, event: Step | Outcome) -> None:
         """A line for each quarter of a shot, and for its end."""

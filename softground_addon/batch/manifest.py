@@ -1,4 +1,4 @@
-"""The manifest of a batch: which shots to bake, how, and where the results go, in TOML or JSON.
+"""The manifest of a batch, in TOML or JSON: shots, their settings and the files of the results.
 
 [defaults]                        # for every shot that does not say otherwise
 preset = "snow"                   # a preset's name, or a .json file
@@ -64,7 +64,7 @@ FRAME_LIMIT = 1_048_574
 """Largest frame number that Blender takes, and minus the smallest."""
 
 MOST_LOOKED_AT = 100_000
-"""Files and folders that the pattern of one shot may make us look at: a disk has millions, and a loop no end."""
+"""Most files and folders that the pattern of one shot may go through: a disk has millions, and a loop no end."""
 
 _FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "edits", "save", "in_place", "report")
 _OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
@@ -83,21 +83,21 @@ class BatchShot:
     scene : str
         The scene in it to bake, or "" for the one that it opens with.
     preset : str
-        Name of a preset, absolute path of a preset file, or "" for what the shot has.
+        Name of a preset, absolute path of a preset file, or "" for the shot's own.
     frames : (int, int) or None
-        First and last frame; None for what the shot has.
+        First and last frame; None for the shot's own.
     cell_size : float or None
-        Size of the ground's cells [m]; None for what the shot has.
+        Size of the ground's cells [m]; None for the shot's own.
     settings : tuple of (str, str)
         Paths below `scene.softground` and their values, in order.
     edits : Path or None
-        Changes of single steps, absolute; None for those that the shot has.
+        Changes of single steps, absolute; None for the shot's own.
     save : Path or None
-        Where the baked shot goes, absolute; None for nowhere or in place.
+        File of the baked shot, absolute; None for none or in place.
     in_place : bool
-        Whether the baked shot replaces `file`.
+        True if the baked shot replaces `file`.
     report : Path or None
-        Where the report goes, absolute.
+        File of the report, absolute.
     """
 
     name: str
@@ -146,7 +146,7 @@ def load(path: Path) -> tuple[BatchShot, ...]:
     Raises
     ------
     InputError
-        If the file cannot be read or says nothing that can be baked; names every missing shot.
+        If the file cannot be read or contains nothing that can be baked; names every missing shot.
     """
     origin = f"Manifest '{path}'"
     try:
@@ -155,7 +155,7 @@ def load(path: Path) -> tuple[BatchShot, ...]:
         raise InputError(f"{origin} cannot be read: {error}") from None
     folder = Path(os.path.realpath(path)).parent
     shots = parse(text, folder, origin, is_json=path.suffix.lower() == ".json")
-    check_places(shots, origin, kept={path: "the manifest"})
+    check_places(shots, origin, protected={path: "the manifest"})
     missing = [str(shot.file) for shot in shots if not is_file(shot.file)]
     if missing:
         listed = ", ".join(f"'{name}'" for name in missing[:10]) + (" and more" if len(missing) > 10 else "")
@@ -171,18 +171,18 @@ def parse(text: str, folder: Path, origin: str, *, is_json: bool = False) -> tup
     text : str
         TOML, or JSON if `is_json`.
     folder : Path
-        What relative paths are relative to, absolute.
+        Base of relative paths, absolute.
     origin : str
-        What error messages call the manifest.
+        Name of the manifest in error messages.
 
     Raises
     ------
     InputError
-        Naming `origin`, the shot, and what is wrong with it.
+        Naming `origin`, the shot, and its problem.
     """
     try:
         return _parsed(json.loads(text) if is_json else tomllib.loads(text), folder, origin)
-    except (ValueError, OverflowError, RecursionError) as error:  # also of values that are too long or deep to be told
+    except (ValueError, OverflowError, RecursionError) as error:  # also of values that are too long or deep to print
         raise InputError(f"{origin} is not readable as {'JSON' if is_json else 'TOML'}: {error}.") from None
 
 
@@ -209,7 +209,7 @@ def _parsed(content: object, folder: Path, origin: str) -> tuple[BatchShot, ...]
 
 
 def chosen(shots: tuple[BatchShot, ...], wanted: list[str]) -> tuple[BatchShot, ...]:
-    """Those shots that are wanted, by name or by number from 1, in the manifest's order; all if none is wanted.
+    """Wanted shots, by name or by number from 1, in the manifest's order; all if none is wanted.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def frame_range(text: str) -> tuple[int, int]:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; False also for names that no file can have."""
+    """True if the file exists; False also for names that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -256,30 +256,30 @@ def _shots(entry: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, 
     if "name" in entry:
         raise InputError(f"{where}: a pattern's shots are named after their files; leave 'name' out.")
     pattern = _text(entry["files"], f"{where}: 'files'")
-    found = sorted(set(_fitting(folder, pattern, where)))
-    if not found:
+    matches = sorted(set(_fitting(folder, pattern, where)))
+    if not matches:
         raise InputError(f"{where}: no file fits the pattern {pattern!r} in '{folder}'.")
-    for path in found:
+    for path in matches:
         yield _shot(entry, defaults, path, folder, where)
 
 
 def _fitting(folder: Path, pattern: str, where: str) -> Iterator[Path]:
     """The files that fit a pattern; InputError where it makes us look through `MOST_LOOKED_AT` of them."""
-    left = MOST_LOOKED_AT
+    remaining = MOST_LOOKED_AT
 
     def entries(inside: Path) -> Iterator[os.DirEntry[str]]:
-        nonlocal left
+        nonlocal remaining
         try:
-            with os.scandir(inside) as found:
-                for number, entry in enumerate(found):
-                    left -= 1 + (number == 0)
-                    if left < 0:
+            with os.scandir(inside) as listing:
+                for number, entry in enumerate(listing):
+                    remaining -= 1 + (number == 0)
+                    if remaining < 0:
                         raise InputError(
                             f"{where}: {pattern!r} goes through more than {MOST_LOOKED_AT:,} files: name the folder "
                             "that the shots are in."
                         )
                     yield entry
-        except (OSError, ValueError):  # what is no folder, or not ours to look into, holds no shots
+        except (OSError, ValueError):  # no folder, or one that we may not read, holds no shots
             return
 
     def below(inside: Path, parts: tuple[str, ...]) -> Iterator[Path]:
@@ -308,7 +308,7 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
     file = _path(str(file), folder, f"{where}: 'file'")
     where = f"{where} ({name})"
     given = {key: entry[key] for key in _FROM_DEFAULTS if key in entry}
-    # a shot that says where it goes overrides both ways of saying it
+    # a destination of the shot overrides both kinds of default
     destination = () if "save" not in given and "in_place" not in given else ("save", "in_place")
     values = {key: value for key, value in defaults.items() if key not in destination} | given
     overrides = dict(_flat(defaults.get("set", {}), f"{where}: 'set'"))
@@ -353,20 +353,20 @@ def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) ->
 
 
 def check_places(
-    shots: Iterable[BatchShot], origin: str, *, kept: Mapping[Path, str] | None = None, report: Path | None = None
+    shots: Iterable[BatchShot], origin: str, *, protected: Mapping[Path, str] | None = None, report: Path | None = None
 ) -> None:
-    """Refuse results that would take the place of what a batch reads or keeps, or of each other.
+    """Refuse results that would overwrite files of the batch, or each other.
 
     Parameters
     ----------
     shots : iterable of BatchShot
         All of the manifest.
     origin : str
-        What error messages call the manifest.
-    kept : mapping of Path to str
-        Other files that no result may replace, and what each of them is.
+        Name of the manifest in error messages.
+    protected : mapping of Path to str
+        Other files that no result may replace, and their descriptions.
     report : Path, optional
-        Where the outcome of the batch goes.
+        File of the outcome of the batch.
 
     Raises
     ------
@@ -374,7 +374,7 @@ def check_places(
         Naming both, and the file.
     """
     shots = tuple(shots)
-    read = {identity(path): what for path, what in (kept or {}).items()}
+    read = {identity(path): what for path, what in (protected or {}).items()}
     for shot in shots:
         if shot.preset.lower().endswith(".json"):
             read[identity(Path(shot.preset))] = f"the preset of '{shot.name}'"

@@ -1,4 +1,4 @@
-"""What a bake has read and written, with checksums: how a later batch knows that a shot is done.
+"""Receipts of the files that a bake has read and written, with checksums, by which a later batch skips a finished shot.
 
 The receipt of a bake holds the checksums of its results and takes its name after them. So wherever a bake is killed,
 either there is a receipt that fits the files on disk and the shot is done, or there is none and it is baked again.
@@ -57,7 +57,7 @@ def dump(
     options : sequence of str
         The bake as options of the command line.
     read, wrote : mapping of path to SHA-256
-        The shot and what it links; the results.
+        The shot and the files that it links; the results.
     totals : mapping
         The bake in a few numbers.
     """
@@ -78,7 +78,7 @@ def totals_if_done(
     """The totals of a bake whose results on disk are those of this very bake, by its receipt.
 
     None if there is no receipt or it cannot be read, if the programs or the options are others, if the shot or a file
-    that it links has changed, or if a result is missing or is not what the bake wrote.
+    that it links has changed, or if a result is missing or has changed.
     """
     try:
         receipt = json.loads(read_regular(path, LARGEST))
@@ -87,8 +87,8 @@ def totals_if_done(
         read, wrote = dict(receipt["read"]), dict(receipt["wrote"])
         if receipt["options"] != list(options) or str(source) not in read or set(wrote) != {str(p) for p in outputs}:
             return None
-        kept = {name: digest for name, digest in read.items() if name not in wrote}  # a shot baked in place has changed
-        expected = kept | wrote
+        sources = {name: digest for name, digest in read.items() if name not in wrote}  # a shot baked in place changed
+        expected = sources | wrote
         return dict(receipt["totals"]) if checksums(map(Path, expected)) == expected else None
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None

@@ -31,17 +31,17 @@ except ImportError:  # Windows
     import msvcrt
 
 ATTEMPTS = 2
-"""How often a shot is tried whose process crashes."""
+"""Most attempts at a shot whose process crashes."""
 
 EXIT_MEANINGS = {0: "done", 2: "refused", 3: "failed"}
-"""What a worker's exit code says of its shot; every other code is a crash."""
+"""Results of a shot by its worker's exit code; every other code is a crash."""
 
 PATIENCE = 10.0
-"""Time that a worker has to end by itself, as is asked of it when the batch is interrupted or was killed [s]."""
+"""Time that a worker has to end by itself after the batch is interrupted or was killed [s]."""
 
 ALGEBRA_THREADS = "OPENBLAS_NUM_THREADS"
-"""What tells numpy's linear algebra how many threads to use. One in each worker is as fast, leaves the other processors
-to other shots, and gives the same bits however many jobs there are."""
+"""Variable for the threads of numpy's linear algebra. One in each worker is as fast, frees other processors for other
+shots, and gives the same bits for any number of jobs."""
 
 POLL = 0.05
 """Time between two looks at the workers [s]."""
@@ -49,7 +49,7 @@ POLL = 0.05
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where and by what a batch is baked.
+    """State folder and workers of a batch.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Workplace:
 
     @property
     def report(self) -> Path:
-        """Where the outcome of every shot goes, unless the user names another place."""
+        """File of the outcome of every shot, unless the user names another."""
         return self.state / "batch.json"
 
     def receipt(self, shot: BatchShot) -> Path:
@@ -79,11 +79,11 @@ class Workplace:
         return self.state / f"{shot.name}.log"
 
     def lock(self, shot: BatchShot) -> Path:
-        """Held by whoever bakes the shot."""
+        """File that the process locks that bakes the shot."""
         return self.state / f"{shot.name}.lock"
 
     def files(self, shots: Iterable[BatchShot]) -> dict[Path, str]:
-        """What is kept in the state folder for these shots, and what each of it is."""
+        """Files in the state folder for these shots, and their descriptions."""
         kinds = {self.receipt: "the receipt", self.log: "the log", self.lock: "the lock"}
         return {self.state: "the state folder"} | {
             place(shot): f"{kind} of '{shot.name}'" for shot in shots for place, kind in kinds.items()
@@ -92,7 +92,7 @@ class Workplace:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the bake of one shot ended.
+    """Outcome of the bake of one shot.
 
     Attributes
     ----------
@@ -104,9 +104,9 @@ class Outcome:
     seconds : float
         Time that they took [s].
     totals : dict
-        What the worker said at its end: steps, depth, force.
+        Figures that the worker printed at its end: steps, depth, force.
     message : str
-        The error that it named.
+        Its error message.
     """
 
     shot: BatchShot
@@ -119,7 +119,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Step:
-    """How far a running bake is.
+    """Progress of a running bake.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Step:
     fraction : float
         Of the whole bake, 0 to 1.
     seconds_left : float
-        As estimated from the time it took so far [s].
+        Remaining time [s], estimated from the time so far.
     """
 
     shot: BatchShot
@@ -156,7 +156,7 @@ class _Worker:
         return self.spent + time.monotonic() - self.started
 
     def lines(self) -> Iterator[bytes]:
-        """What it has printed since the last time, in whole lines unless it has ended; all but progress is logged."""
+        """Output since the last call, in whole lines unless the process has ended; all but progress is logged."""
         has_ended = self.process.poll() is not None
         while line := self.printed.readline():
             if not (line.endswith(b"\n") or has_ended):
@@ -168,7 +168,7 @@ class _Worker:
             yield line
 
     def close(self) -> None:
-        """Log what it has printed last, and leave the files to others."""
+        """Log the last output, and close the files."""
         deque(self.lines(), maxlen=0)
         for file in (self.printed, self.log):
             with contextlib.suppress(OSError):
@@ -186,7 +186,7 @@ def run(
     """Bake shots, at most `jobs` at a time; each ends in one outcome, in the order of `shots`.
 
     A shot that is done already is skipped, one whose process crashes (or takes longer than `timeout` seconds) is tried
-    once more. On KeyboardInterrupt the running workers are asked to end, and what is not done is 'interrupted'.
+    once more. On KeyboardInterrupt the running workers are asked to end, and unfinished shots are 'interrupted'.
 
     Raises
     ------
@@ -250,7 +250,7 @@ class _Batch:
             log.write(f"$ {command_line(command, windows=os.name == 'nt')}\n".encode())
             output = (self._printed / shot.name).open("wb")  # no pipe: it would have to be emptied all the time
             printed = (self._printed / shot.name).open("rb")
-            inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # who outlives us keeps the lock
+            inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # workers that outlive us keep the lock
             started = time.monotonic()
             process = subprocess.Popen(
                 command,
@@ -277,7 +277,7 @@ class _Batch:
         )
 
     def _follow(self, worker: _Worker) -> None:
-        """Take what a worker has printed, and notice that it has ended or takes too long."""
+        """Read the output of a worker, and notice that it has ended or takes too long."""
         if self._timeout and time.monotonic() - worker.started > self._timeout:
             worker.timed_out = True
             worker.process.kill()
@@ -298,8 +298,8 @@ class _Batch:
             return
         worker.totals = said.get("totals", worker.totals)
         passed = time.monotonic() - worker.started
-        left = passed * (1.0 - fraction) / max(fraction, 0.01)
-        self._show(Step(worker.shot, stage, fraction, left))
+        remaining = passed * (1.0 - fraction) / max(fraction, 0.01)
+        self._show(Step(worker.shot, stage, fraction, remaining))
 
     def _ended(self, worker: _Worker) -> None:
         code = worker.process.wait()
@@ -337,7 +337,7 @@ class _Batch:
 
 
 def _locked(path: Path) -> IO[bytes]:
-    """The lock file, locked; waits for a worker that a killed batch has left behind and that is about to end."""
+    """The lock file, locked; waits for a worker that a killed batch left behind and that is about to end."""
     lock = path.open("ab")
     deadline = time.monotonic() + PATIENCE
     while True:

@@ -12,7 +12,7 @@ _PLAIN = re.compile(r"[\w\\/:.=+@~-]+", re.ASCII)
 """Words that the Windows shell leaves alone."""
 
 _SPECIAL = re.compile(r'[()%!^"<>&|]')
-"""What the Windows shell acts on outside quotation marks, unless a caret stands before it."""
+"""Characters that the Windows shell acts on outside quotation marks, unless a caret stands before them."""
 
 
 def command_line(words: Sequence[str], *, windows: bool) -> str:

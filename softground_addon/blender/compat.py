@@ -9,8 +9,11 @@ import bpy
 HAS_SLOTS = bpy.app.version >= (4, 4, 0)
 """Actions keep their curves in the channelbag of a slot instead of one list."""
 
-SERIES = "{}.{}".format(*bpy.app.version)
-"""The version, but for corrections."""
+VERSION, SERIES = bpy.app.version_string, "{}.{}".format(*bpy.app.version)
+"""The version, with corrections and without."""
+
+WRITES_CLOUDS = bpy.app.version >= (4, 3, 0)
+"""Point clouds are written to USD; earlier Blenders write the vertices of meshes alone."""
 
 
 def action_curves(action: bpy.types.Action, slot: Any = None) -> list[bpy.types.FCurve]:
@@ -102,6 +105,13 @@ def write_input(modifier: Any, identifier: str, value: Any) -> None:
         owner.value = value
     else:
         owner[identifier] = value
+
+
+def shader_tree(material: bpy.types.Material) -> Any:
+    """The nodes of a material, switched on if need be: from 5.0 on it has them anyway, and the switch warns."""
+    if bpy.app.version < (5, 0, 0) or material.node_tree is None:
+        material.use_nodes = True
+    return material.node_tree
 
 
 def remove_scene(scene: bpy.types.Scene) -> None:

@@ -10,13 +10,16 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
 from . import session, tread_images
-from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
-from .ground import baked_ground, weather_keys
-from .interface import modal_bake, overlay
-from .interface.outdated import compare_bake
+from .debris import debris_object
+from .ground import baked_ground
 from .live import live
+from .operators import modal_bake
+from .panels.outdated import compare_bake
 from .reading import analysis
+from .sampling.temporary import IS_TEMPORARY
+from .viewport import overlay
+from .weather import weather_keys
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does; edited meshes may be what it steps on, or what prints."""
@@ -44,8 +47,12 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
+        _follow_deletion(scene)
         if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
             _follow_weather_keys(scene)
+            for copy in [update.id.original for update in depsgraph.updates if update.is_updated_geometry]:
+                if isinstance(copy, bpy.types.Object):
+                    weather_keys.follow(copy)
     if analysis.is_empty() or depsgraph is None:
         return
     if any(depsgraph.id_type_updated(kind) for kind in EDITED):
@@ -56,6 +63,12 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         return
     elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
         _later(compare_prediction)
+
+
+def _follow_deletion(scene: Any) -> None:
+    ground = scene.softground.ground
+    if ground is not None and not live.is_on():
+        debris_object.follow(ground, is_deleted=baked_ground.is_deleted(ground))
 
 
 def _follow_weather_keys(scene: Any) -> None:
@@ -106,6 +119,7 @@ def after_undo(*_: Any) -> None:
     tread_images.forget()
     analysis.look_again()
     live.after_undo()
+    _follow_deletion(bpy.context.scene)
     _follow_weather_keys(bpy.context.scene)
 
 

@@ -29,6 +29,16 @@ def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     return corners
 
 
+def add_faces(mesh: bpy.types.Mesh, corner_vertex: NDArray[np.integer], face_start: NDArray[np.integer]) -> None:
+    """Add faces to a mesh without, by the vertex of each corner (L,) and the first corner of each face (P,)."""
+    mesh.loops.add(len(corner_vertex))
+    if len(corner_vertex):
+        attribute: Any = mesh.attributes[".corner_vert"]
+        attribute.data.foreach_set("value", corner_vertex.astype(np.int32))
+    mesh.polygons.add(len(face_start))
+    mesh.polygons.foreach_set("loop_start", face_start.astype(np.int32))
+
+
 def triangles(mesh: bpy.types.Mesh) -> Indices:
     """Vertices of the triangles that Blender shows the faces as, (T, 3)."""
     corners, _ = triangle_corners(mesh)

@@ -14,25 +14,6 @@ COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
 
 
-def new_group(name: str, mark: str) -> Any:
-    """A new, empty group for a modifier, with a custom property by which it is known whatever the user calls it."""
-    tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    tree.is_modifier = True
-    tree[mark] = True
-    return tree
-
-
-def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:
-    """The first modifier whose node group is of a kind, whatever the names of both have become; None without one."""
-    return next((one for one in obj.modifiers if (group := getattr(one, "node_group", None)) and is_it(group)), None)
-
-
-def inputs_of(modifier: Any) -> dict[str, str]:
-    """Identifier of each input of a modifier's node group, by its name."""
-    sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
-    return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
-
-
 class OtherGraphError(Exception):
     """A group has other nodes or links than those that it is to have."""
 

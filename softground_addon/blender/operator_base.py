@@ -38,7 +38,7 @@ class OnShot:
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is any character in the scene."""
         cast("Any", cls).poll_message_set("Add a character first")
-        return bool(character_setup.characters_of(settings.scene_of(context)))
+        return bool(character_setup.characters_of(settings.options_of(context)))
 
 
 class OnBake:
@@ -47,7 +47,7 @@ class OnBake:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is a bake on the scene's ground."""
-        ground = settings.scene_of(context).softground.ground
+        ground = settings.options_of(context).ground
         cast("Any", cls).poll_message_set("Bake the footprints first")
         return ground is not None and baked_ground.is_baked(ground)
 

@@ -7,37 +7,29 @@ from typing import Any
 
 import bpy
 
-from . import handlers, properties, session
+from . import handlers, properties, session, state
 from .command_line import cli
 from .ground import look
 from .importing import import_capture
-from .interface import (
-    bake_result,
-    character_editing,
+from .live import live
+from .operators import add_weather, bake_result, character_editing, modal_bake, prediction, sample_scene, show_prints
+from .operators import shot_setup as operators
+from .output import event_points, export_formats, force_curves, make_sound
+from .panels import (
     foot_locks_panel,
     ground_options_panel,
     help,
     menus,
-    modal_bake,
-    operators,
-    outdated,
-    overlay,
     panels,
-    prediction,
     preset_icons,
     preset_menu,
     response_panel,
-    sample_scene,
-    step_dragging,
-    step_editing,
     steps_panel,
     weather_panel,
 )
-from .live import live
-from .output import add_weather, event_points, export_formats, force_curves, make_sound
-from .properties.material import look_followers
-from .properties.scene import depth_field
 from .reading import analysis
+from .viewport import overlay, step_dragging, step_editing
+from .weather import weather_result
 
 _SETTINGS: tuple[tuple[Any, type], ...] = (
     (bpy.types.Scene, properties.SoftGroundSettings),
@@ -69,6 +61,7 @@ CLASSES = (
     *foot_locks_panel.CLASSES,
     *weather_panel.CLASSES,
     *bake_result.CLASSES,
+    *show_prints.CLASSES,
     *step_editing.CLASSES,
     *step_dragging.CLASSES,
     *steps_panel.CLASSES,
@@ -81,6 +74,7 @@ _registered = ExitStack()
 def register() -> None:
     """Register classes, `scene.softground` and the command `softground`: all of it, or on an error nothing."""
     with ExitStack() as undo:
+        undo.callback(state.forget)
         for cls in CLASSES:
             if issubclass(cls, bpy.types.Operator):  # Blender shows docstrings as tooltips, with their line breaks
                 cls.bl_description = " ".join((cls.__doc__ or "").split())
@@ -89,15 +83,23 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
-        for part in (handlers, overlay, step_dragging, menus, help, import_capture):
+        for part in (handlers, menus, help, import_capture):
             part.register()
             undo.callback(part.unregister)
-        look_followers.append(_follow_look)
-        undo.callback(look_followers.clear)
-        depth_field.update(get=prediction.shown_cm, set=prediction.type_cm)
-        undo.callback(depth_field.clear)
+        state.state.hooks.update(
+            follow_look=_follow_look,
+            show_depth_cm=prediction.shown_cm,
+            type_depth_cm=prediction.type_cm,
+            show_snow_cm=weather_result.snow_cm,
+            type_snow_cm=weather_result.set_snow_cm,
+            show_weather_hours=weather_result.hours,
+            type_weather_hours=weather_result.set_hours,
+        )
+        for draw, when in () if bpy.app.background else (*overlay.DRAWN, *step_dragging.DRAWN):
+            handle = bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when)
+            undo.callback(bpy.types.SpaceView3D.draw_handler_remove, handle, "WINDOW")
+        undo.callback(overlay.unregister)
         undo.callback(prediction.unregister)
-        undo.callback(outdated.forget)
         undo.callback(preset_icons.unregister)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)

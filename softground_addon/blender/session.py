@@ -3,41 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
+from .state import state
+
 PANEL_AREAS = ("VIEW_3D",)
 """Editors that show the add-on's panels and overlay."""
 
 
-@dataclass
-class _Shown:
-    """What the panel shows of a bake. Writing a property has Blender draw the whole window anew, scene and all, which
-    takes longer than many a step of a bake; this does not."""
-
-    is_baking: bool = False
-    progress: float = 0.0
-    status: str = ""
-    is_previewing: bool = False
-    also_chosen: tuple[str, ...] = ()
-
-
-_shown = _Shown()
-
-
 def _is_baking(_session: SoftGroundSession) -> bool:
-    return _shown.is_baking
+    return state.is_baking
 
 
 def _progress_of(_session: SoftGroundSession) -> float:
-    return _shown.progress
+    return state.progress
 
 
 def _status_of(_session: SoftGroundSession) -> str:
-    return _shown.status
+    return state.status
 
 
 class SoftGroundSession(bpy.types.PropertyGroup):
@@ -82,36 +68,36 @@ def current() -> Any:
 
 def show_bake(progress: float, status: str) -> None:
     """Let the panel say how far the bake is, 0 to 1, and what it is doing; nothing else is drawn."""
-    _shown.is_baking, _shown.progress, _shown.status = True, progress, status
+    state.is_baking, state.progress, state.status = True, progress, status
     redraw()
 
 
 def show_no_bake() -> None:
     """Let the panel show that no bake runs."""
-    _shown.is_baking, _shown.progress, _shown.status = False, 0.0, ""
+    state.is_baking, state.progress, state.status = False, 0.0, ""
     redraw()
 
 
 def show_preview(is_shown: bool) -> None:
     """Note whether the ground shows for a moment what it does not hold."""
-    _shown.is_previewing = is_shown
+    state.is_previewing = is_shown
 
 
 def is_previewing() -> bool:
     """Whether the ground shows for a moment what it does not hold, as while a step is dragged."""
-    return _shown.is_previewing
+    return state.is_previewing
 
 
 def choose_steps(step: str, also: Iterable[str] = ()) -> None:
     """Choose a step of the bake by its id, and others with it."""
     current().step = step
-    _shown.also_chosen = tuple(name for name in also if name != step)
+    state.also_chosen = tuple(name for name in also if name != step)
 
 
 def chosen_steps() -> tuple[str, ...]:
     """Ids of the steps that are chosen: first the one that the panel shows."""
     step = current().step
-    return (step, *(name for name in _shown.also_chosen if name != step)) if step else ()
+    return (step, *(name for name in state.also_chosen if name != step)) if step else ()
 
 
 def is_rendering() -> bool:

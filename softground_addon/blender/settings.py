@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import bpy
 
-from ..core.after.felt_weather import FeltWeather
-from ..core.after.weather import span_of
 from ..core.composers.relief_plan import IMAGE
 from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
-from ..core.motion.motion import shortest_length
+from ..core.motion.sole_motion import shortest_length
 from ..core.response.foot_holds import FootHold
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SceneUnits, SoleSource
+from ..core.weather.felt_weather import FeltWeather
+from ..core.weather.weather import span_of
 from . import tread_images
+from .camera_views import camera_view
+from .state import state
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
@@ -42,19 +44,19 @@ def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     return cast("bpy.types.Scene", context.scene)
 
 
-_existing: dict[int, tuple[int, bool]] = {}
-"""By session uid of objects: their number of users when they were last looked for in the collections, and whether they
-were in one. Going through the collections takes too long to be done in `draw`; who leaves one has a user less."""
+def options_of(context: bpy.types.Context) -> Any:
+    """The settings of the context's scene."""
+    return cast("Any", context.scene).softground
 
 
 def exists(obj: bpy.types.Object | None) -> bool:
     """Whether an object that the settings name is there: those deleted in the viewport live on in the settings only."""
     if obj is None:
         return False
-    users, found = _existing.get(obj.session_uid, (-1, False))
+    users, found = state.existing.get(obj.session_uid, (-1, False))
     if users != obj.users:
         found = bool(obj.users_collection)
-        _existing[obj.session_uid] = obj.users, found
+        state.existing[obj.session_uid] = obj.users, found
     return found
 
 
@@ -69,9 +71,9 @@ def typed(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def material_of(scene: bpy.types.Scene) -> GroundMaterial:
+def material_of(options: Any) -> GroundMaterial:
     """The scene's ground material as the core's type."""
-    values = scene.softground.material
+    values = options.material
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 
@@ -143,18 +145,19 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         As if Grounding were on.
     """
     options = scene.softground
+    frames, has_ground = (options.frame_start, options.frame_end), exists(options.ground)
     return BakeSettings(
         file=bpy.data.filepath,
         scene=scene.name,
-        ground=name_of(options.ground) if exists(options.ground) else None,
+        ground=name_of(options.ground) if has_ground else None,
         characters=tuple(character_of(entry) for entry in options.characters if is_set_up(entry)),
         preset=options.material.preset,
         surface=options.material.surface,
-        material=material_of(scene),
+        material=material_of(options),
         pressure=options.pressure,
         painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         cell_size_m=typed(options.cell_size),
-        frames=(options.frame_start, options.frame_end),
+        frames=frames,
         **vars(units_of(scene)),
         response=_response(options, grounded=grounded),
         sink_feet=options.sink_feet,
@@ -174,6 +177,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
         weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
+        camera=None if has_ground else camera_view(scene, frames),
     )
 
 
@@ -275,24 +279,24 @@ def user_folder() -> Path:
     return Path(bpy.utils.user_resource("SCRIPTS", path=USER_FOLDER))
 
 
-def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:
+def apply_preset(options: Any, preset: Preset) -> None:
     """Set the scene's ground to a preset's; what the preset does not say, and a cell size of the user's own, stay."""
-    for group, field, value in _of_preset(scene, preset):
+    for group, field, value in _of_preset(options, preset):
         setattr(group, field, value)
-    options = scene.softground
     if preset.cells_along_sole is not None and options.cells_along_sole > 0:
         options.cells_along_sole = preset.cells_along_sole
-        fit_cells(scene)
+        fit_cells(options)
 
 
-def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
+def as_preset(options: Any, name: str, source: str = "") -> Preset:
     """The scene's ground as a preset of that name."""
-    options = scene.softground
+    material = material_of(options)
+    scale = typed(options.length_scale)
     return Preset(
         name,
         source,
         options.material.surface,
-        material_of(scene),
+        replace(material, **{field: float(f"{getattr(material, field) / scale:.5g}") for field in _LENGTHS}),
         options.pressure,
         typed(options.tread),
         typed(options.cells_along_sole) or None,
@@ -300,30 +304,33 @@ def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
     )
 
 
-def holds(scene: bpy.types.Scene, preset: Preset) -> bool:
+def holds(options: Any, preset: Preset) -> bool:
     """Whether the scene's ground is as a preset says, or will be with its first character."""
-    for group, field, value in _of_preset(scene, preset):
-        if not scene.softground.characters and not group.is_property_set(field):
+    for group, field, value in _of_preset(options, preset):
+        if not options.characters and not group.is_property_set(field):
             continue
-        now = getattr(group, field)
-        if not (abs(now - value) <= 1e-6 * abs(value) if isinstance(value, float) else now == value):
+        if not _is(group, field, value):
             return False
     return True
 
 
-def take_defaults(scene: bpy.types.Scene) -> None:
-    """Set what the user has not set of the ground to the default preset, let feet sink, and fit the cells to the soles.
+def _is(group: Any, field: str, value: Any) -> bool:
+    """True if a setting has a value, but for rounding."""
+    now = getattr(group, field)
+    return bool(abs(now - value) <= 1e-6 * abs(value) if isinstance(value, float) else now == value)
 
-    For the first character of a scene. The defaults of the properties themselves are those of version 0.1: a file keeps
-    only what was set, and the others are to stay as they were when it was saved.
+
+def take_defaults(options: Any) -> None:
+    """Set what the user has not set of the ground to the preset of the preferences, and the cells to fit the soles.
+
+    For the first character of a scene. What is as by default is set too: a file keeps only what was set.
     """
     preset = default_preset()
-    options = scene.softground
-    for group, field, value in _defaults(scene, preset):
+    for group, field, value in _of_preset(options, preset):
         if not group.is_property_set(field):
             setattr(group, field, value)
     if not options.is_property_set("cell_size") and not options.is_property_set("cells_along_sole"):
-        options.cells_along_sole = preset.cells_along_sole or presets.find(presets.DEFAULT).cells_along_sole
+        options.cells_along_sole = preset.cells_along_sole or options.cells_along_sole
 
 
 def default_preset() -> Preset:
@@ -341,165 +348,50 @@ def _preferred() -> str:
     return str(add_on.preferences.default_preset)
 
 
-def preset_of(scene: bpy.types.Scene) -> str:
+def preset_of(options: Any) -> str:
     """The name of the preset that a scene was set to last, or will be with its first character."""
-    options = scene.softground
     if options.characters or options.material.is_property_set("preset"):
         return str(options.material.preset)
     return _preferred()
 
 
-def untouched(scene: bpy.types.Scene) -> list[tuple[Any, str]]:
+def untouched(options: Any) -> list[tuple[Any, str]]:
     """The settings that `take_defaults` would set, as groups and names."""
-    options = scene.softground
-    fields = [(group, field) for group, field, _ in _defaults(scene, default_preset())]
+    fields = [(group, field) for group, field, _ in _of_preset(options, default_preset())]
     fields += [(options, "cell_size"), (options, "cells_along_sole")]
     return [(group, field) for group, field in fields if not group.is_property_set(field)]
 
 
-def _of_preset(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, Any]]:
+def _of_preset(options: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
     """What a preset says: groups of settings, names in them, values."""
-    options, material = scene.softground, scene.softground.material
-    said = [(material, field, getattr(preset.material, field)) for field in MATERIAL_FIELDS]
+    material = options.material
+    scale = {field: typed(options.length_scale) for field in _LENGTHS}
+    said = [(material, field, getattr(preset.material, field) * scale.get(field, 1.0)) for field in MATERIAL_FIELDS]
     said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
     said += [(options, "debris", preset.debris)]
     return [one for one in said if one[2] is not None]
 
 
-def _defaults(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, Any]]:
-    """What a scene starts with beside the cells."""
-    return [*_of_preset(scene, preset), (scene.softground, "sink_feet", True), (scene.softground, "relief", "FINE")]
+SMALL_SOLE = 0.1
+"""Lengths of presets are those of soles of a person; of soles smaller than this they are as much smaller [m]."""
+
+_LENGTHS = ("rim_reach", "blur_sigma")
+"""Fields of a material that go with the soles."""
 
 
-def fit_cells(scene: bpy.types.Scene) -> None:
-    """Set the cell size to what the scene's preset says of the soles, unless the user has set it."""
-    options = scene.softground
+def fit_cells(options: Any) -> None:
+    """Set the cell size, and lengths for small soles, to what the preset says of them, unless the user has set them."""
     count, lengths = options.cells_along_sole, [one.sole_length for one in options.characters if one.sole_length > 0]
-    if count > 0 and lengths:
-        options.cell_size = float(f"{shortest_length(lengths) / count:.2g}")
+    if not lengths:
+        return
+    shortest = shortest_length(lengths)
+    if count > 0:
+        options.cell_size = float(f"{shortest / count:.2g}")
         options.cells_along_sole = count  # which a cell size of the user's own switches off
-
-
-_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\]")
-
-
-def check_stored(group: Any) -> None:
-    """Whether all values of a group of settings are such as its fields take: those of a forged file may be any.
-
-    Raises
-    ------
-    InputError
-        If one is not; names it.
-    """
-    for field in group.bl_rna.properties:
-        if field.identifier in (*_OTHERS, "name"):
-            continue
-        value = getattr(group, field.identifier)
-        if field.type == "COLLECTION":
-            for one in value:
-                check_stored(one)
-        elif field.type == "POINTER":
-            if isinstance(value, bpy.types.PropertyGroup):
-                check_stored(value)
-        elif not _takes(field, value):
-            raise InputError(
-                f"The file holds {value!r} as '{field.name}', which it cannot be: right-click it, choose Reset to "
-                "Default Value, and set it again."
-            )
-
-
-def _takes(field: Any, value: Any) -> bool:
-    if field.type in ("FLOAT", "INT"):
-        return all(field.hard_min <= one <= field.hard_max for one in (value if field.is_array else (value,)))
-    return field.type != "ENUM" or value != ""  # Blender gives no name to a number that names nothing
-
-
-def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:
-    """Set one setting by its path below `scene.softground`, e.g. `characters[0].mass` to `80`.
-
-    Raises
-    ------
-    InputError
-        If there is no such setting, or the value is none that it takes; says which there are.
-    """
-    owner: Any = settings
-    steps = _parse(path)
-    for step in steps[:-1]:
-        owner = _descend(owner, step, path)
-    name = steps[-1]
-    properties = getattr(owner, "bl_rna", None) and owner.bl_rna.properties
-    if not properties or not isinstance(name, str) or name not in properties or properties[name].is_readonly:
-        raise InputError(f"There is no setting '{path}'. {_choices(owner)}")
-    setattr(owner, name, _value(properties[name], text, path))
-
-
-def _parse(path: str) -> list[str | int]:
-    steps: list[str | int] = []
-    position = 0
-    while position < len(path):
-        match = _STEP.match(path, position)
-        if not match or (match[0].startswith(".") and not steps):
-            raise InputError(
-                f"'{path}' is not a path to a setting, like material.youngs_modulus or characters[0].mass."
-            )
-        name, index, *quoted = match.groups()
-        steps.append(int(index) if index else name or next(text for text in quoted if text is not None))
-        position = match.end()
-    if not steps:
-        raise InputError("An empty path names no setting.")
-    return steps
-
-
-_OTHERS = ("rna_type", "armature", "ground", "tread_image")
-"""What settings name but do not hold."""
-
-
-def _descend(owner: Any, step: str | int, path: str) -> Any:
-    is_list = isinstance(owner, bpy.types.bpy_prop_collection) or not hasattr(owner, "bl_rna")
-    try:
-        if is_list:
-            return owner[step]
-        if isinstance(step, str) and step in owner.bl_rna.properties and step not in _OTHERS:
-            return getattr(owner, step)
-    except (KeyError, IndexError, TypeError):
-        pass
-    raise InputError(f"There is no setting '{path}' ({step!r} is unknown). {_choices(owner)}")
-
-
-def _choices(owner: Any) -> str:
-    properties = getattr(owner, "bl_rna", None) and owner.bl_rna.properties
-    if not properties:
-        return ""
-    return "There are: " + ", ".join(key for key in properties.keys() if key not in ("rna_type", "name")) + "."  # noqa: SIM118
-
-
-def _value(setting: bpy.types.Property, text: str, path: str) -> Any:
-    kind = setting.type
-    if kind in ("FLOAT", "INT"):
-        try:
-            number = float(text) if kind == "FLOAT" else int(text)
-        except ValueError:
-            number = float("nan")
-        if not setting.hard_min <= number <= setting.hard_max:
-            raise InputError(
-                f"'{path}' cannot be {text!r}: it takes a number from {setting.hard_min:g} to {setting.hard_max:g}."
-            )
-        return number
-    if kind == "BOOLEAN":
-        if text.lower() not in ("true", "false", "1", "0", "on", "off"):
-            raise InputError(f"'{path}' cannot be {text!r}: it takes true or false.")
-        return text.lower() in ("true", "1", "on")
-    if kind == "ENUM":
-        names = [item.identifier for item in setting.enum_items]
-        if text not in names:
-            raise InputError(f"'{path}' cannot be {text!r}: it takes one of {', '.join(names)}.")
-        return text
-    if kind == "STRING":
-        return text
-    kept: dict[str, Any] = {"Object": bpy.data.objects, "Image": bpy.data.images}
-    if kind == "POINTER" and (target := setting.fixed_type.identifier) in kept:
-        if text not in kept[target]:
-            raise InputError(f"'{path}' cannot be {text!r}: there is no {target.lower()} of that name.")
-        return kept[target][text]
-    raise InputError(f"'{path}' is a group of settings: name one of those in it.")
+    with suppress(InputError):
+        preset = presets.find(preset_of(options), (presets.FOLDER, user_folder()))
+        as_said = [one for one in _of_preset(options, preset) if one[1] in _LENGTHS and _is(*one)]
+        before, options.length_scale = options.length_scale, min(1.0, shortest / SMALL_SOLE)
+        for group, field, value in as_said if options.length_scale != before else ():
+            setattr(group, field, value / before * options.length_scale)

@@ -63,15 +63,13 @@ class Graph:
         """a operation b."""
         return self.out(self.node("ShaderNodeMath", {0: a, 1: b}, operation=operation))
 
-    def normal(self) -> Socket:
-        """The smooth normal of the mesh."""
-        return self.out(self.node("ShaderNodeNewGeometry"), 1)
-
     def attribute(self, name: str) -> Socket:
         """A float attribute of the mesh; 0 where the mesh has none."""
         return self.out(self.node("ShaderNodeAttribute", attribute_name=name), 2)
 
-    def ramp(self, value: Socket, low: float, high: float, start: float = 0.0, end: float = 1.0) -> Socket:
+    def ramp(
+        self, value: Socket, low: float, high: float, start: Socket | float = 0.0, end: Socket | float = 1.0
+    ) -> Socket:
         """From `start` at `low` to `end` at `high`, smoothly, and level outside."""
         inputs = {0: value, 1: low, 2: high, 3: start, 4: end}
         return self.out(self.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP"))
@@ -80,6 +78,10 @@ class Graph:
         """Noise around 0.5 whose features are about `size` [m] large; from `FLAT` on they vary with x and y alone."""
         inputs = {"Vector": place, "Scale": 1.0 / size, "Detail": detail, "Roughness": roughness}
         return self.out(self.node("ShaderNodeTexNoise", inputs, noise_dimensions="2D" if size >= FLAT else "3D"))
+
+    def swing(self, place: Socket, size: float, detail: float = 2.0, roughness: float = 0.5) -> Socket:
+        """Noise around 0: relief that fades out with it leaves neither a step nor a ridge."""
+        return self.noise(place, size, detail, roughness) + -0.5
 
     def cells(self, place: Socket, size: float) -> Any:
         """Voronoi cells of about `size` [m]: outputs are distance to the centre [cells], random colour."""

@@ -9,17 +9,15 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.relief import tread_map
+from .state import state
 
 LARGEST = 4096
 """Pixels along the longer side of an image that is read: 16 million take 0.6 GB and a second or two."""
 
-_known: dict[tuple[int, str], str] = {}
-"""Maps as text by the session uid and the file of images; empty of those that cannot be read."""
-
 
 def forget() -> None:
     """Read images anew from now on."""
-    _known.clear()
+    state.tread_maps.clear()
 
 
 def map_of(image: bpy.types.Image | None) -> str:
@@ -27,9 +25,9 @@ def map_of(image: bpy.types.Image | None) -> str:
     if image is None:
         return ""
     key = image.session_uid, image.filepath
-    if key not in _known:
-        _known[key] = _read(image)
-    return _known[key]
+    if key not in state.tread_maps:
+        state.tread_maps[key] = _read(image)
+    return state.tread_maps[key]
 
 
 def check(image: bpy.types.Image | None) -> None:

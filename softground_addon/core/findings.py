@@ -48,6 +48,18 @@ class Finding:
         return asdict(self)
 
 
+def listed(names: Iterable[str], most: int = 3) -> str:
+    """Names in quotation marks, the first few of them where they are more.
+
+    Examples
+    --------
+    >>> listed(["a", "b"]), listed("abcde")
+    ("'a', 'b'", "'a', 'b', 'c' and 2 more")
+    """
+    quoted = [f"'{name}'" for name in names]
+    return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
+
+
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
     """The worst first, those that are as bad in the order given."""
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))

@@ -7,26 +7,19 @@ thought, everything depends.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import IntEnum
 from typing import Any
 
-from .after.felt_weather import FeltWeather
+from .ground.camera_view import CameraView
+from .ground.display_spacing import spacing_of
 from .ground.material import GroundMaterial, Pressure
+from .loads.cell_limits import Fineness
 from .loads.estimate import ForceModel
 from .response.foot_holds import FootHold
 from .response.response import GroundingOptions, TiltOptions
-
-CLOSE_UP_SPACING = 0.0025
-"""Distance of the vertices of a trail that is seen from close by [m], about: grooves of a tread are 4 mm wide."""
-
-
-def spacing_of(cell_size: float, relief: str) -> float:
-    """Distance of the vertices along a trail that show some relief [m]: that of the cells, or halved some times."""
-    halvings = max(0, round(math.log2(cell_size / CLOSE_UP_SPACING))) if relief == "CLOSE_UP" else 0
-    return cell_size / 2.0**halvings
+from .weather.felt_weather import FeltWeather
 
 
 class Acts(IntEnum):
@@ -198,6 +191,8 @@ class BakeSettings(SceneUnits):
         Character, name of a sole, and its `relief.tread_map` as text, as a bake has read them from its meshes.
     weather : FeltWeather or None
         What steps find of earlier ones follows from it; None where they feel none.
+    camera : CameraView or None
+        The scene's, where a ground is to be made; None without one.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -230,11 +225,17 @@ class BakeSettings(SceneUnits):
     debris: bool = field(default=False, metadata=_on(Acts.RESPONDING))
     shoe_treads: tuple[tuple[str, str, str], ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
+    camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
 
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
         return spacing_of(self.cell_size_m, self.relief)
+
+    @property
+    def fineness(self) -> Fineness:
+        """How finely the ground is pressed and shown, from which follows what a bake takes."""
+        return Fineness(self.cell_size_m, self.material.rim_reach, self.relief, self.relief_vertices)
 
     def between(self, first: Acts, last: Acts) -> dict[str, Any]:
         """The settings that act first on one of these stages."""
@@ -251,6 +252,8 @@ def _part(group: Any, first: Acts, last: Acts, inherited: Acts = Acts.READING) -
     found: dict[str, Any] = {}
     for one in fields(group):
         value, acts = getattr(group, one.name), one.metadata.get("acts", inherited)
+        if one.metadata.get("said_if_on") and value == one.default:
+            continue
         if _is_group(value):
             value = _part(value, first, last, acts)
             is_in = bool(value)

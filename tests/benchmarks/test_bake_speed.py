@@ -7,8 +7,8 @@ import pytest
 
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.rig_mapping import map_rig
-from softground_addon.blender.characters.rig_sampling import sample_character
+from softground_addon.blender.rigs.rig_mapping import map_rig
+from softground_addon.blender.sampling.rig_sampling import sample_character
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
 

@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, node_graph
-from softground_addon.blender.after import debris_object
-from softground_addon.core.after.debris import Debris
+from softground_addon.blender import compat, node_modifiers
+from softground_addon.blender.debris import debris_object
+from softground_addon.core.debris.debris import Debris
 from softground_addon.core.settings import SceneUnits
 from tests.benchmarks.test_playback_speed import heavy_walker
 
@@ -45,7 +45,7 @@ def an_instance_each(obj):
     """A copy in which every piece has a shape."""
     copy = obj.copy()
     modifier = copy.modifiers[0]
-    compat.write_input(modifier, node_graph.inputs_of(modifier)["Shaped"], 10**7)
+    compat.write_input(modifier, node_modifiers.inputs_of(modifier)["Shaped"], 10**7)
     bpy.context.scene.collection.objects.link(copy)
     return copy
 

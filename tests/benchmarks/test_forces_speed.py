@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
+from softground_addon.core.dynamics.body_dynamics import body_dynamics
 from softground_addon.core.ground.heightfield import FlatTerrain
-from softground_addon.core.loads.body_dynamics import body_dynamics
 from softground_addon.core.loads.contact_timing import refine_contacts
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.forces import whole_body_forces

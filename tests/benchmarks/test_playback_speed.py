@@ -14,8 +14,9 @@ import pytest
 
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import baked_ground, ground_mesh, playback, trail_detail
+from softground_addon.blender.ground import baked_ground, ground_mesh, trail_detail
 from softground_addon.blender.output import exports
+from softground_addon.blender.playback import playback
 from tests.blender import point_caches, shots
 
 pytestmark = pytest.mark.benchmark

@@ -4,7 +4,9 @@ import bpy
 import pytest
 
 from softground_addon.blender import compat
-from softground_addon.blender.ground import baked_ground, weather, weather_modifier
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.playback import weather_modifier
+from softground_addon.blender.weather import ground_weather as weather
 from tests.benchmarks.test_playback_speed import in_turns, times
 from tests.blender import shots
 

@@ -4,7 +4,8 @@ import struct
 
 import numpy as np
 
-from softground_addon.blender.ground import baked_ground, playback
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.playback import playback
 
 HEADER = struct.Struct("<12siiffi")
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import bpy
 
 from softground_addon.blender import handlers, registration
-from softground_addon.blender.interface import prediction
-from softground_addon.blender.interface.panel_base import SidebarPanel
+from softground_addon.blender.operators import prediction
+from softground_addon.blender.operators.panel_base import SidebarPanel
 
 
 class Layout:

@@ -8,17 +8,17 @@ import numpy as np
 from sample_scenes.body import BONES
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
+from softground_addon.blender.sampling.rig_sampling import sample_character
 from softground_addon.blender.settings import character_of
-from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.legs.foot_placement import lowest_clearance, posed_points
+from softground_addon.core.legs.grounding import leg_soles
+from softground_addon.core.legs.legs import Leg
+from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.record.ground_history import GroundHistory
-from softground_addon.core.response.foot_placement import lowest_clearance, posed_points
-from softground_addon.core.response.grounding import leg_soles
-from softground_addon.core.response.legs import Leg
 from softground_addon.core.rig.mapping import RigMapping
-from tests.blender import rigs
+from tests.blender import rigs, shots
 
 _MIXAMO = {
     "hips": "Hips",
@@ -126,6 +126,21 @@ def with_feet_on_a_root(armature, frames=72):
             for path in ("location", "rotation_quaternion"):
                 bone.keyframe_insert(path, frame=frame)
     return armature
+
+
+def linked_walker(folder):
+    """The walking figure and its mesh, linked from a file into a new scene, and active."""
+    shots.walker(bpy.context.scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "asset.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(folder / "asset.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Walker", "Walker Figure"]
+    scene = bpy.context.scene
+    for obj in wanted.objects:
+        scene.collection.objects.link(obj)
+    scene.render.fps = 24
+    bpy.context.view_layer.objects.active = bpy.data.objects["Walker"]
+    return bpy.data.objects["Walker"]
 
 
 def key_steps(armature, body, feet, frames=72, stride=0.5, period=24, lift=0.10):

@@ -26,7 +26,7 @@ def make(blend: str, heights: str) -> None:
     from softground_addon.core.record.pressed_ground import PressedGround
     from tests.blender import shots
     from tests.blender.grounds import plane
-    from tests.blender.test_playback_render import set_up_render
+    from tests.blender.playback.test_playback_render import set_up_render
 
     softground_addon.register()
     try:

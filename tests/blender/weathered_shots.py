@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from softground_addon.blender.ground import weather
-from softground_addon.core.after.weather import matter_of
+from softground_addon.blender.weather import ground_weather as weather
+from softground_addon.core.weather.weather import matter_of
 from tests.blender import shots
 
 SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}

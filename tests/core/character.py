@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion
+from softground_addon.core.motion.motion import CharacterMotion
+from softground_addon.core.motion.sole_motion import Sole, SoleMotion
 
 RECTANGLE = np.array([[-0.1, -0.05], [0.1, -0.05], [0.1, 0.05], [-0.1, 0.05]])
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion
+from softground_addon.core.motion.motion import CharacterMotion
 from softground_addon.core.motion.props import Prop, supports
+from softground_addon.core.motion.sole_motion import Sole, SoleMotion
 from softground_addon.core.numerics.rigid import rotation
 from tests.core.walkers import loads_of, pose
 

@@ -13,7 +13,8 @@ from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.loads.contacts import Contacts
 from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.loads.forces import ContactForces
-from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
+from softground_addon.core.motion.motion import CharacterMotion, steps_per_frame
+from softground_addon.core.motion.sole_motion import Sole, SoleMotion, SolePatch
 from softground_addon.core.pressing.deformation import target_compression
 
 MASS = 77.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from math import pi
 from pathlib import Path
@@ -22,6 +23,11 @@ PAGES = 2
 SHORT: Pause = 0.03
 ROW = 11
 """Distance between two places where a button is looked for, little more than half a button's height [px]."""
+
+
+def module(name: str) -> Any:
+    """A module of the add-on's Blender side, whatever Blender has named its package."""
+    return next(one for key, one in sys.modules.items() if key.endswith(f"softground_addon.blender.{name}"))
 
 
 class Hand:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 
 import bpy
+
+from tests.gui.hand import module
 
 
 class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
@@ -49,10 +50,8 @@ def longest_pauses(*, during_bake: bool, count: int = 8) -> list[tuple[float, fl
 @contextmanager
 def ticks_timed() -> Iterator[list[tuple[float, float]]]:
     """What the ticks of a bake take of the processor [s], each with how far it was: the add-on's own in the pauses."""
-    module = next(
-        m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.interface.modal_bake")
-    )
-    tick, ticks = module._Bake._tick, []
+    bakes = module("operators.modal_bake")
+    tick, ticks = bakes._Bake._tick, []
 
     def timed(operator):
         started = time.thread_time()
@@ -61,11 +60,11 @@ def ticks_timed() -> Iterator[list[tuple[float, float]]]:
         finally:
             ticks.append((time.thread_time() - started, bpy.context.window_manager.softground.progress))
 
-    module._Bake._tick = timed
+    bakes._Bake._tick = timed
     try:
         yield ticks
     finally:
-        module._Bake._tick = tick
+        bakes._Bake._tick = tick
 
 
 @contextmanager

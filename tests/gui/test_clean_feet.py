@@ -21,7 +21,7 @@ def test_a_walk_on_the_spot_travels(facts):
 
 
 def test_its_feet_are_cleaned_in_a_layer_of_their_own(facts):
-    assert {"SoftGround Response", "SoftGround Root Motion"} <= set(facts["tracks"])
+    assert {"SoftGround Clean Feet", "SoftGround Root Motion"} <= set(facts["layers"])
 
 
 def test_a_contact_is_locked_where_the_playhead_is(facts):

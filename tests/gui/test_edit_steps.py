@@ -14,6 +14,7 @@ def test_a_click_in_the_list_chooses_a_step_and_goes_to_its_frame(facts):
     assert facts["chosen"].startswith("Walker/foot.")
     shown, wanted = facts["frame"]
     assert shown == wanted
+    assert facts["off centre"] < 1e-3
 
 
 def test_mute_is_one_undo_step(facts):
@@ -57,3 +58,7 @@ def test_a_mesh_presses_a_step_until_that_is_undone(facts):
     before, shod = facts["in a shoe"]
     assert shod == pytest.approx(0.2 * 0.4, rel=0.15)
     assert facts["without the shoe"] == before
+
+
+def test_what_a_dialog_changes_of_a_step_is_pressed_as_a_job(facts):
+    assert facts["changed in a dialog"] != facts["chosen in a dialog"]

@@ -11,7 +11,7 @@ def facts(tell):
 
 
 def test_each_panel_has_its_picture(facts):
-    assert len(facts["panels"]) == 12
+    assert len(facts["panels"]) == 13
 
 
 def test_nothing_goes_wrong_on_the_console(facts):

@@ -20,7 +20,7 @@ def test_the_button_lets_the_feet_down(facts):
     assert facts["floating"] > 10.0
     assert facts["left"] < 2.0
     assert facts["grounding"]
-    assert "SoftGround Response" in facts["tracks"]
+    assert "SoftGround Response" in facts["layers"]
 
 
 def test_the_prints_are_up_to_date_with_it(facts):

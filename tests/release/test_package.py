@@ -108,11 +108,38 @@ addon_utils.disable("bl_ext.user_default.softground", default_set=True)
 """
 
 
-def test_installing_enabling_and_disabling_it_prints_nothing(built, tmp_path):
-    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path), "PYTHONWARNINGS": "default"}
+def run_installed(script, built, folder):
+    """A script in a Python of its own, in which Blender finds the extension where users have theirs."""
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder), "PYTHONWARNINGS": "default"}
     environment.pop("OCIO", None)  # left by a Blender 5 further up; the one that finds it says so
-    command = [sys.executable, "-c", INSTALL, str(built)]
+    command = [sys.executable, "-c", script, str(built)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_installing_enabling_and_disabling_it_prints_nothing(built, tmp_path):
+    done = run_installed(INSTALL, built, tmp_path)
     assert done.stdout.replace('STATUS Installed "softground"\n', "") == ""  # Blender's own word
     assert done.stderr == ""
+
+
+BAKE = """
+import sys
+import bpy
+import addon_utils
+bpy.ops.wm.read_homefile(use_empty=True)
+bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+bpy.ops.softground.add_sample_scene()
+bpy.ops.softground.add_character()
+bpy.ops.softground.bake()
+assert not [name for name in sys.modules if name.split(".")[0] == "softground_addon"]
+summary = bpy.context.scene.softground.ground.data["softground_summary"]
+print("steps", summary["steps"])
+addon_utils.disable("bl_ext.user_default.softground", default_set=True)
+"""
+
+
+def test_what_is_installed_bakes(built, tmp_path):
+    steps = re.search(r"^steps (\d+)$", run_installed(BAKE, built, tmp_path).stdout, re.MULTILINE)
+    assert int(steps[1]) >= 6

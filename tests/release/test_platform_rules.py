@@ -25,7 +25,7 @@ WRITERS = {
     "softground_addon/batch/runner.py": "logs and locks in the state folder that the user names; a temporary folder",
     "softground_addon/blender/command_line/cli.py": "the null device, once nobody reads",
     "softground_addon/core/record/record.py": "memory",
-    "softground_addon/core/after/wave_file.py": "memory",
+    "softground_addon/core/events/wave_file.py": "memory",
 }
 """Modules that write otherwise than to the name that `files.replacing` gives, and where to."""
 

@@ -14,9 +14,9 @@ def loads_in_blender(scene, body, motion, terrain=None):
     """Loads of a character that plays a motion, mapped and sampled as a user's."""
     from sample_scenes.character import create_character
     from sample_scenes.keys import write_action
-    from softground_addon.blender.characters.rig_mapping import map_rig
-    from softground_addon.blender.characters.rig_sampling import sample_character
     from softground_addon.blender.jobs import run
+    from softground_addon.blender.rigs.rig_mapping import map_rig
+    from softground_addon.blender.sampling.rig_sampling import sample_character
     from softground_addon.core.loads.estimate import estimate_loads
 
     armature = create_character("Body", body, scene.collection)

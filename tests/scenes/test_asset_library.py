@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sample_scenes import asset_library
-from softground_addon.blender.ground import weather
-from softground_addon.core.ground import presets
-from tests.blender.test_playback import world_positions
+from softground_addon.blender.weather import ground_weather as weather
+from softground_addon.core.ground.surfaces import SURFACES
+from tests.blender.playback.test_playback import world_positions
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -44,8 +44,8 @@ def test_each_kind_is_there_in_a_catalogue_of_its_own(library, opened):
         assert f"{thing.asset_data.catalog_id}:SoftGround/{kind}:" in said
         counts[kind] += 1
     assert counts == {
-        "Materials": len(presets.SURFACES),
-        "Debris": len(presets.SURFACES),
+        "Materials": len(SURFACES),
+        "Debris": len(SURFACES),
         "Weather": len(weather.PRESETS),
         "Characters": 2,
     }

@@ -144,9 +144,9 @@ class TestInBlender:
     def loads(self, scene, gait):
         from sample_scenes.character import create_character
         from sample_scenes.keys import write_action
-        from softground_addon.blender.characters.rig_mapping import map_rig
-        from softground_addon.blender.characters.rig_sampling import sample_character
         from softground_addon.blender.jobs import run
+        from softground_addon.blender.rigs.rig_mapping import map_rig
+        from softground_addon.blender.sampling.rig_sampling import sample_character
         from softground_addon.core.ground.heightfield import FlatTerrain
         from softground_addon.core.loads.estimate import estimate_loads
         from softground_addon.core.rig.mapping import RigMapping

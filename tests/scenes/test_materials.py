@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.presets import SURFACES
+from softground_addon.core.ground.surfaces import SURFACES
 
 
 @pytest.fixture
 def ensure_material(scene):
-    from softground_addon.blender.ground.materials import ensure_material
+    from softground_addon.blender.materials.materials import ensure_material
 
     return ensure_material
 
@@ -135,17 +135,19 @@ def test_an_unknown_surface_is_refused_with_the_known_ones(ensure_material):
         ensure_material("lava")
 
 
-def test_a_blend_shows_both_surfaces_by_what_is_painted(scene):
-    from softground_addon.blender.ground.materials import BLEND, ensure_blend
+def test_the_landscape_shows_snow_and_sand_by_what_is_painted(scene):
+    from sample_scenes import landscape
 
-    material = ensure_blend("snow", "sand")
+    material = landscape.snow_to_sand()
     mix = next(node for node in material.node_tree.nodes if node.type == "MIX_SHADER")
     assert {link.from_node.type for inlet in mix.inputs[1:] for link in inlet.links} == {"BSDF_PRINCIPLED"}
-    assert BLEND in {node.attribute_name for node in upstream(mix.inputs[0]) if node.type == "ATTRIBUTE"}
-    assert ensure_blend("snow", "sand") == material
-    assert ensure_blend("sand", "snow") != material
-    with pytest.raises(InputError, match="snow, sand"):
-        ensure_blend("snow", "lava")
+    assert landscape.SAND in {node.attribute_name for node in upstream(mix.inputs[0]) if node.type == "ATTRIBUTE"}
+    output = material.node_tree.get_output_node("ALL")
+    assert output.inputs["Surface"].links[0].from_node == mix
+    shaders = [link.from_node for inlet in mix.inputs[1:] for link in inlet.links]
+    heights = upstream(output.inputs["Displacement"])
+    assert len(set(shaders)) == 2
+    assert {"ATTRIBUTE", "MIX"} <= {node.type for node in heights}
 
 
 @pytest.fixture
@@ -183,25 +185,101 @@ def spot(scene, tmp_path):
     return ground, seen
 
 
-@pytest.mark.parametrize("surface", SURFACES)
-def test_what_is_displaced_is_low(spot, ensure_material, surface):
-    """EEVEE draws stripes where the mesh bends, the stronger the higher the displacement stands from 0."""
+@pytest.fixture
+def relief(spot):
+    """What a material displaces [m], seen from above on a spot of 18 m."""
     ground, seen = spot
+    ground.scale = (100.0, 100.0, 1.0)
+    scene = ground.users_scene[0]
+    scene.camera.data.ortho_scale, scene.view_settings.view_transform = 18.0, "Raw"
+
+    def heights(material):
+        ground.data.materials.append(material)
+        tree = material.node_tree
+        output = tree.get_output_node("ALL")
+        height = output.inputs["Displacement"].links[0].from_node.inputs["Height"].links[0].from_socket
+        shown = tree.nodes.new("ShaderNodeEmission")
+        grey = tree.nodes.new("ShaderNodeMath")
+        grey.operation, grey.inputs[1].default_value, grey.inputs[2].default_value = "MULTIPLY_ADD", 4.0, 0.5
+        tree.links.new(height, grey.inputs[0])
+        tree.links.new(grey.outputs[0], shown.inputs["Color"])
+        tree.links.new(shown.outputs[0], output.inputs["Surface"])
+        return (seen() - 0.5)[..., 0] / 4.0
+
+    return heights
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", SURFACES)
+def test_pieces_have_the_colour_of_the_ground_that_they_are_of(spot, ensure_material, surface):
+    """As light as its look on the average, between trodden and open."""
+    ground, seen = spot
+    ground.scale = (100.0, 100.0, 1.0)
+    scene = ground.users_scene[0]
+    scene.camera.data.ortho_scale, scene.view_settings.view_transform = 8.0, "Raw"
     material = ensure_material(surface)
     ground.data.materials.append(material)
-    ground.scale = (100.0, 100.0, 1.0)
-    scene, tree = ground.users_scene[0], material.node_tree
-    scene.camera.data.ortho_scale, scene.view_settings.view_transform = 18.0, "Raw"
-    output = tree.get_output_node("ALL")
-    height = output.inputs["Displacement"].links[0].from_node.inputs["Height"].links[0].from_socket
-    shown = tree.nodes.new("ShaderNodeEmission")
-    grey = tree.nodes.new("ShaderNodeMath")
-    grey.operation, grey.inputs[1].default_value, grey.inputs[2].default_value = "MULTIPLY_ADD", 4.0, 0.5
-    tree.links.new(height, grey.inputs[0])
-    tree.links.new(grey.outputs[0], shown.inputs["Color"])
-    tree.links.new(shown.outputs[0], output.inputs["Surface"])
-    heights = (seen() - 0.5) / 4.0
-    assert 0.001 < np.abs(heights).max() < 0.05
+    tree, shown = material.node_tree, material.node_tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(principled(material).inputs["Base Color"].links[0].from_socket, shown.inputs["Color"])
+    tree.links.new(shown.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    luminance, light = np.array([0.2126, 0.7152, 0.0722]), []
+    for compression in (0.02, 0.0):
+        ground.data.attributes["softground_compression"].data.foreach_set("value", np.full(6, compression))
+        light.append(seen().mean(axis=(0, 1)) @ luminance)
+    assert 0.95 * light[0] < np.dot(SURFACES[surface].colour, luminance) < 1.1 * light[1]
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_what_is_displaced_is_low(relief, ensure_material, surface):
+    """EEVEE draws stripes where the mesh bends, the stronger the higher the displacement stands from 0."""
+    assert 0.001 < np.abs(relief(ensure_material(surface))).max() < 0.05
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_no_ridge_runs_along_the_edge_of_a_print(relief, ensure_material, surface):
+    """What breaks the edge lies as much below as above the ground on both sides, or it is a hairline on the crest."""
+    across = relief(ensure_material(surface)).mean(axis=0)
+    open_ground, edge, print_floor = across[10:20].mean(), across[26:28].mean(), across[-10:].mean()
+    assert edge < max(open_ground, print_floor) + 0.0008
+
+
+def test_glints_of_snow_mirror_the_sky(spot, ensure_material):
+    """At a grazing angle, EEVEE draws a facet that mirrors the ground or looks away as a dark dot."""
+    ground, seen = spot
+    material = ensure_material("snow")
+    ground.data.materials.append(material)
+    scene, tree, coat = ground.users_scene[0], material.node_tree, principled(material).inputs
+    scene.view_settings.view_transform = "Raw"
+    scene.camera.location, scene.camera.rotation_euler.x = (0.0, -1.0, 0.2), 1.37
+    scene.camera.data.ortho_scale = 0.03
+    eye = tree.nodes.new("ShaderNodeNewGeometry").outputs["Incoming"]
+    light = tree.nodes.new("ShaderNodeVectorMath")
+    light.operation = "REFLECT"
+    height = tree.nodes.new("ShaderNodeSeparateXYZ")
+    dark = tree.nodes.new("ShaderNodeMath")
+    dark.operation = "GREATER_THAN"
+    dark.inputs[1].default_value = 0.1
+    both = tree.nodes.new("ShaderNodeMath")
+    both.operation = "MULTIPLY"
+    shown = tree.nodes.new("ShaderNodeCombineXYZ")
+    emission = tree.nodes.new("ShaderNodeEmission")
+    for socket, into in (
+        (eye, light.inputs[0]),
+        (coat["Coat Normal"].links[0].from_socket, light.inputs[1]),
+        (light.outputs[0], height.inputs[0]),
+        (coat["Coat Weight"].links[0].from_socket, shown.inputs["X"]),
+        (height.outputs["Z"], dark.inputs[0]),
+        (dark.outputs[0], both.inputs[0]),
+        (coat["Coat Weight"].links[0].from_socket, both.inputs[1]),
+        (dark.outputs[0], shown.inputs["Y"]),
+        (both.outputs[0], shown.inputs["Z"]),
+        (shown.outputs[0], emission.inputs["Color"]),
+        (emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"]),
+    ):
+        tree.links.new(socket, into)
+    glints, downward, dots = seen().max(axis=(0, 1))
+    assert min(glints, downward) > 0.5
+    assert dots < 0.01
 
 
 @pytest.mark.slow

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -56,4 +58,22 @@ def plot_trial(trial: Trial, path: str, curves: dict[str, Array], deviation: Arr
     axes[0].legend(loc="upper right", ncols=3, fontsize="small")
     axes[-1].set_xlabel("time [s]")
     figure.savefig(file, dpi=110)
+    plt.close(figure)
+
+
+def plot_boots(facts: list[dict[str, Any]], depth_cm: Callable[[float], float], file: Path) -> None:
+    """Measured boots by the hand hardness of the snow, as grey bands from quartile to quartile, and ours as a line."""
+    classes = [fact for fact in facts if fact["kind"] == "measured" and fact.get("hardness")]
+    figure, axes = plt.subplots(figsize=(7, 4), constrained_layout=True)
+    for number, fact in enumerate(classes):
+        low, high = fact["hardness_low"], min(fact["hardness_high"], 5.0)
+        axes.fill_between([low, high], fact["depth_low_cm"], fact["depth_high_cm"], color="0.85", linewidth=0)
+        label = "measured: median, quartiles" if number == 0 else None
+        axes.plot([low, high], [fact["depth_median_cm"]] * 2, color="0.45", linewidth=2.0, label=label)
+    hardness = np.linspace(1.0, 5.0, 41)
+    axes.plot(hardness, [depth_cm(one) for one in hardness], color="tab:red", linewidth=1.8, label="SoftGround")
+    axes.set_xticks(range(1, 6), ["fist", "four fingers", "one finger", "pencil", "knife"])
+    axes.set(xlabel="hand hardness of the snow", ylabel="depth of a boot, 33 kPa [cm]", ylim=(0, None))
+    axes.legend(frameon=False)
+    figure.savefig(file, metadata={"Date": None})
     plt.close(figure)

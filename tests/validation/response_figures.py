@@ -15,6 +15,7 @@ import softground_addon
 from sample_scenes.stick_figure import add_stick_figure
 from softground_addon.core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains, lean
 from tests.blender import responders, rigs, shots
+from tests.core.response.test_tilt import torques
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 WIDTH, HEIGHT = 300, 420
@@ -43,7 +44,7 @@ def tilt_curves() -> None:
     axes[1].set_title("damping, at 0.6 Hz")
     for label, mass, arm in (("mouse", 0.03, 0.03), ("adult", 77.5, 1.0), ("giant", 2000.0, 3.0)):
         gains = TiltGains()
-        alpha, beta = gains.torques(inertia=mass * arm**2, arm=arm)
+        alpha, beta = torques(gains, mass * arm**2, arm)
         axes[2].plot(*run(TiltGains.from_torques(alpha, beta, inertia=mass * arm**2, arm=arm)), label=label)
     axes[2].plot(*run(TiltGains(), rate=24), "k:", label="24 fps")
     axes[2].plot(*run(body_gains(*AUTHORS_TORQUES, mass=77.5, arm=1.0)), "--", label="paper's scene")

@@ -2,7 +2,7 @@
 
     python -m tests.validation.spectrograms [PICTURE]
 
-Dashed: between which resonances of the ground are published; see `core.after.voices`.
+Dashed: between which resonances of the ground are published; see `core.ground.surfaces`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import matplotlib as mpl
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from softground_addon.core.after import sound, wave_file
-from softground_addon.core.after.events import events
+from softground_addon.core.events import sound, wave_file
+from softground_addon.core.events.events import events
 from softground_addon.core.ground.presets import find
 from softground_addon.core.record.edits import step_id
 from tests.core.walkers import pressed, walk

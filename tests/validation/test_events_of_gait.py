@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softground_addon.core.after.events import events
+from softground_addon.core.events.events import events
 from tests.validation.scoring import crossings, plates_saw_everything
 from tests.validation.test_forces_of_gait import DATA, loads_of, read
 from tests.validation.trials import motion_of_trial

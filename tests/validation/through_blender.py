@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from softground_addon.blender.characters.rig_mapping import map_rig
-from softground_addon.blender.characters.rig_sampling import sample_character
+from softground_addon.blender.rigs.rig_mapping import map_rig
+from softground_addon.blender.sampling.rig_sampling import sample_character
 from softground_addon.core.motion.motion import CharacterMotion
 
 

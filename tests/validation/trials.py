@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from softground_addon.core.capture import c3d
 from softground_addon.core.capture.captured import Plate, bridged
 from softground_addon.core.capture.joint_centres import CapturedBody, captured_body
-from softground_addon.core.motion.motion import JOINTS, CharacterMotion, Sole, SoleMotion
+from softground_addon.core.motion.motion import JOINTS, CharacterMotion
+from softground_addon.core.motion.sole_motion import Sole, SoleMotion
 from softground_addon.core.numerics.intervals import runs
+from tests.core.capture.free_moments import free_moment
 from tests.validation.scoring import LOADED
 
 Array = NDArray[np.float64]
@@ -108,7 +110,7 @@ def _mass(path: Path, content: bytes) -> float:
     about = path.with_suffix(".json")
     if about.exists():
         return float(json.loads(about.read_text())["mass_kg"])
-    values = c3d.parameters_of(content).values
+    values = c3d._parameters(content)[0].values
     masses = [value for (_, name), value in values.items() if name in MASSES and isinstance(value, np.ndarray)]
     if not masses or not masses[0].size or not masses[0].flat[0] > 0:
         raise SystemExit(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
@@ -129,7 +131,7 @@ def _measured_on_feet(body: CapturedBody) -> tuple[Array, Array, Array]:
     centres, moments = np.full((count, len(SIDES), 3), np.nan), np.full((count, len(SIDES)), np.nan)
     for plate in body.plates:
         averaged = _at_frames(plate, body.rate, count)
-        force, centre, moment = averaged.force, averaged.centre_of_pressure(), averaged.free_moment()
+        force, centre, moment = averaged.force, averaged.centre_of_pressure(), free_moment(averaged)
         for first, last in zip(*runs(force[:, 2] > LOADED), strict=True):
             step = slice(first, last)
             foot = np.argmin([np.nanmean(_distance(body, side, centre[step], step)) for side in SIDES])

@@ -34,8 +34,6 @@ Array = NDArray[np.float64]
 GRAVITY = 9.81
 CHARACTERISTIC_TIMES = (0.05, 0.1, 0.15, 0.2)
 """Ground times at which the impulse model is run: those of the presets [s]."""
-CRISP = "WHOLE_BODY crisp"
-"""The whole-body model with the momentum of landing feet given to the ground as they stop."""
 COLUMNS = {
     "trial": "{:<18}",
     "path": "{:<7}",
@@ -108,16 +106,12 @@ def motions_of(trial: Trial) -> Iterator[tuple[str, CharacterMotion]]:
 
 def estimates(motion: CharacterMotion) -> Iterator[tuple[str, Array]]:
     """Forces of each model at the motion's frames, (F, 2, 3) [N], left foot first."""
-    models: list[tuple[str, ForceModel, float]] = [
-        (model, "WHOLE_BODY", CHARACTERISTIC_TIMES[0]) for model in ("WHOLE_BODY", CRISP)
-    ]
+    models: list[tuple[str, ForceModel, float]] = [("WHOLE_BODY", "WHOLE_BODY", CHARACTERISTIC_TIMES[0])]
     models += [(f"IMPULSE tau={tau:.2f}", "IMPULSE", tau) for tau in CHARACTERISTIC_TIMES]
     order = [[sole.sole.side for sole in motion.soles].index(side) for side in "LR"]
     for name, model, tau in models:
         material = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=tau)
-        loads = estimate_loads(
-            motion, FlatTerrain(), force_model=model, material=material, crisp_landings=name == CRISP
-        )
+        loads = estimate_loads(motion, FlatTerrain(), force_model=model, material=material)
         steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
         yield name, loads.forces.forces[::steps, order]
 

@@ -1,1 +1,1 @@
-"""Keys above an animation, as a layer that can be taken off again: in the NLA, or in a copied action."""
+"""Layers of keys on top of a rig's animation, and the animation of an object."""

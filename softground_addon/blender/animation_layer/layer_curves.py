@@ -1,4 +1,4 @@
-"""Keys of a layer: what is added to the channels of an object, and the action that holds them."""
+"""Actions made of keys: curves of single channels, straight between their keys, and the object that plays them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compat import new_channels, new_curve
+from ..compat import new_channels, new_curve, set_slot
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class LayerCurve:
-    """Keys of one channel on top of what animates it.
+    """Keys of one channel.
 
     Attributes
     ----------
@@ -25,9 +25,8 @@ class LayerCurve:
         Data path from the object.
     index : int
     group : str
-        What the user sees the channel under: the bone.
+        Name under which the user sees the channel: the bone.
     frames, values : (K,) float arrays
-        Added to the channel; a quaternion is multiplied.
     """
 
     path: str
@@ -59,11 +58,13 @@ def add_curve(channels: Any, curve: LayerCurve) -> None:
     written.update()
 
 
-def value_of(obj: bpy.types.Object, path: str, index: int) -> float:
-    """What a channel stands at now."""
-    return float(obj.path_resolve(path)[index])
+def assign_action(obj: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Let an object play an action from `new_action`."""
+    animation = obj.animation_data or obj.animation_data_create()
+    animation.action = action
+    set_slot(animation, next(iter(getattr(action, "slots", ())), None))
 
 
-def set_value(obj: bpy.types.Object, path: str, index: int, value: float) -> None:
-    """Set a channel."""
-    obj.path_resolve(path)[index] = value
+def path_of_bone(bone: str, channel: str) -> str:
+    """Data path of a channel of a bone, from its armature."""
+    return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{channel}'

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.self_check import no_motion
 from ...core.errors import InputError
 from ...core.findings import Finding
+from ...core.motion.motion import CharacterMotion
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.numerics.slices import Slices, sliced
+from ...core.settings import BakeSettings
+from .. import settings
 from ..ground import ground_mesh
+from ..rigs.frame_ranges import holds_a_pose
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -29,6 +35,14 @@ holds 9."""
 
 MOST_MISSED = 0.02
 """Share of the prints' area that may lie far from any vertex before the ground is refined along the trail."""
+
+
+def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> None:
+    """Raise InputError if nobody moves, and keys hold nobody in a pose."""
+    still = [finding for motion in motions if (finding := no_motion(motion))]
+    rigs = [settings.found(one.armature) for one in wanted.characters if one.armature]
+    if len(still) == len(motions) and not any(map(holds_a_pose, rigs)):
+        raise InputError(" ".join(finding.text for finding in still))
 
 
 @dataclass(frozen=True)

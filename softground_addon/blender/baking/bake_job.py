@@ -17,17 +17,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.debris import Debris
-from ...core.after.events import as_edited, events
-from ...core.after.thrown_debris import thrown
 from ...core.composers.ground_plan import GroundPlan
-from ...core.composers.pressed_shot import PressedShot, edit_findings, offsets_mm, press_shot
+from ...core.composers.pressed_shot import edit_findings, offsets_mm, press_shot
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import gap_table, response_findings, suggested_speeds, worst_gaps
-from ...core.composers.self_check import self_check
+from ...core.composers.self_check import bottomed_out, self_check
+from ...core.debris.debris import Debris
+from ...core.events.events import as_edited, events
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground.soft_ground import SoftGround
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.motion.motion import shortest_sole
@@ -37,18 +35,19 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.settings import Acts, BakeSettings
 from .. import settings
-from ..after import debris_object
-from ..ground import baked_ground, created_ground, ground_mesh, trail_detail, weather
+from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.baked_ground import EVENTS
-from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, counted, meanwhile
+from ..materials.materials import drafted
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of, read_shot, settings_of
 from ..response import response_job
+from ..weather import ground_weather as weather
 from . import bake_report, step_soles
-from .bake_checks import copy_findings, coverage, coverage_findings, wants_detail
-from .publish import at_the_end, publish, sign
+from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
+from .publish import Published, at_the_end, publish, sign, with_debris
+from .scene_findings import scene_findings
 
 Array = NDArray[np.float64]
 
@@ -99,10 +98,8 @@ def bake(
     asked = wanted or settings_of(scene)
     wanted, refused = response_job.without_sinking(scene, asked)
     started = time.perf_counter()
-    moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
-    shot = yield from read_shot(scene, wanted)
+    shot, said = yield from _read(scene, wanted, write=write)
     surface, factors = shot.surface, shot.surface.factors if shot.surface else None
-    hidden = bake_report.hidden_skins(scene, wanted, shot.motions)
     edits = step_soles.edits_with_soles(scene, wanted, edits)
     movers = staleness.of_movers(scene, wanted) | staleness.of_soles(scene, mesh_soles(edits))
     ground = ground_of(wanted, shot)
@@ -115,7 +112,8 @@ def bake(
     frames = wanted.frames[1] - wanted.frames[0] + 1
     pressing = press_shot(wanted, shot.motions, ground, edits, factors)
     pressed = yield from counted(pressing, "simulate", frames)
-    left, debris = _thrown(wanted, ground, pressed)
+    throwing = with_debris.slices(pressed.left, ground, wanted, pressed.loads)
+    left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
     footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
@@ -125,21 +123,20 @@ def bake(
     if factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
-    checking = self_check.slices(
-        pressed.loads,
-        footprints,
-        shot.terrain,
-        wanted.cell_size_m,
-        wanted.ground.name if wanted.ground else "the ground",
-    )
+    name = wanted.ground.name if wanted.ground else "the ground"
+    checking = self_check.slices(pressed.loads, footprints, shot.terrain, wanted.cell_size_m, name)
     findings = [
         *(yield from meanwhile(Progress("simulate", 1.0), checking)),
-        *moving,
+        *bottomed_out(footprints, wanted.material, name),
+        *said,
         *edit_findings(left),
-        *hidden,
+        *response_job.keyed_responses(wanted),
     ]
     of_responses = response_findings(pressed.responses)
-    happened = events(pressed.loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
+    happened = yield from meanwhile(
+        Progress("simulate", 1.0),
+        events.slices(pressed.loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0]),
+    )
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -157,13 +154,12 @@ def bake(
     layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del pressed, pressing, measuring, checking
-    written: Written | None = None
+    del pressed, pressing, throwing, measuring, checking
+    published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        written = yield from write_prints(scene, wanted, shot, left.with_about(about), sole_length)
-        findings += written.findings
-        debris_object.put(written.ground, debris, surface=wanted.surface, units=wanted)
+        published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
+        findings += of_ground
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()
@@ -174,39 +170,23 @@ def bake(
             "write": finished - simulated,
             "frames_per_second": frames / (finished - started),
         },
-        playback_error_m=written.error if written else None,
+        playback_error_m=published.error if published else None,
         findings=[*findings, *of_responses, *refused],
     )
-    if written:
-        stamped = asked.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
-        told = {"summary": bake_report.summary(result), "warnings": result["warnings"]}
-        sign(written.display_mesh, written.ground, stamped, movers, **told)
+    if published:
+        sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
 
 
-def _thrown(wanted: BakeSettings, ground: SoftGround, pressed: PressedShot) -> tuple[record.BakeRecord, Debris | None]:
-    """What the steps of a shot leave, with what they throw booked; that is None where debris is off."""
-    if not wanted.debris:
-        return pressed.left, None
-    return thrown(
-        pressed.left,
-        pressed.loads,
-        ground,
-        surface=wanted.surface,
-        cell_size=wanted.cell_size_m,
-        gravity=wanted.gravity_m_s2,
-    )
-
-
-@dataclass(frozen=True)
-class Written:
-    """What was written to the ground, and what carries it."""
-
-    ground: bpy.types.Object
-    display_mesh: bpy.types.Object
-    error: float
-    findings: list[Finding]
+def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
+    """A shot, and what the user should know of what it was read from; InputError if nobody moves in what is written."""
+    moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
+    shot = yield from read_shot(scene, wanted)
+    if write:
+        check_motion(wanted, shot.motions)
+    skins = [*bake_report.hidden_skins(scene, wanted, shot.motions), *bake_report.shapes_left_out(scene, wanted)]
+    return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
 
 
 def write_prints(
@@ -214,9 +194,10 @@ def write_prints(
     wanted: BakeSettings,
     shot: Shot,
     left: record.BakeRecord,
+    debris: Debris | None,
     sole_length: float,
-) -> Job[Written]:
-    """Put the prints on the ground, all of them in the last step.
+) -> Job[tuple[Published, list[Finding]]]:
+    """Put the prints on the ground, all of them in the last step; with what the user should know of that.
 
     Parameters
     ----------
@@ -226,6 +207,8 @@ def write_prints(
         Of its ground; the motions are not needed.
     left : BakeRecord
         The inputs that it is about are told the name of a ground that is created.
+    debris : Debris or None
+        What its steps throw.
     sole_length : float
         Of the shortest sole [m].
     """
@@ -245,28 +228,18 @@ def write_prints(
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
-        publishing = publish(left, place, wanted)
+        publishing = publish(left, debris, place, wanted)
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
-    ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
-    weather.renew(ground, weather_before, left)
-    return Written(ground, published.display_mesh, published.error, findings)
+    weather.renew(published.ground, weather_before, left)
+    return published, findings
 
 
 def _created(
     drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan, trail: Trail
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
-    reach = created_ground.reach_of(wanted.material)
-    yield Progress("write", 0.2)
-    wide = created_ground.widened(scene, plan, wanted.margin_m)
-    layout = created_ground.lay_out(
-        wide,
-        wanted.cell_size_m,
-        wanted.unit_scale_m,
-        reach=reach,
-        close_up=created_ground.close_up_of(scene, wanted, plan),
-    )
+    layout = yield from meanwhile(Progress("write", 0.2), created_ground.laid_out(wanted, plan))
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)

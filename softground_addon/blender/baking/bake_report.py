@@ -14,10 +14,11 @@ from ...core.record.footprints import Footprint
 from ...core.record.typical_depth import typical_of
 from ...core.settings import BakeSettings
 from .. import settings
-from ..characters.skin_sampling import hidden_on
-from ..ground import ground_mesh, still_ground, weather
+from ..ground import ground_mesh, still_ground
 from ..jobs import STAGES
 from ..reading import staleness
+from ..sampling.skin_sampling import hidden_on, left_out_on
+from ..weather import ground_weather as weather
 
 FLOATING = "floating_mm"
 """Entry of a bake's summary: how far feet float above their prints [mm]."""
@@ -66,11 +67,30 @@ def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence
     return findings
 
 
+def shapes_left_out(scene: bpy.types.Scene, wanted: BakeSettings) -> list[Finding]:
+    """What shapes the skin of the feet and was not read."""
+    findings = []
+    for one in wanted.characters:
+        if not one.armature:
+            continue
+        bones = {bone for sole in one.soles for bone in (sole.bone, sole.toe_bone, *sole.parts) if bone}
+        findings += [
+            Finding(
+                "skin_left_out",
+                "warning",
+                f"The skin of '{body}' was read without {' and '.join(causes)}.",
+                "Check that its feet lie in their prints; if not, apply it or switch it off.",
+            )
+            for body, causes in left_out_on(scene, settings.found(one.armature), bones).items()
+        ]
+    return findings
+
+
 def summary(result: dict[str, Any]) -> dict[str, float]:
     """What the panel shows of a bake."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
-    shown = {key: totals[key] for key in (*ground_mesh.SHOWN, TYPICAL)}
+    shown = {key: totals[key] for key in ground_mesh.SHOWN}
     last = max((step["frame_end"] for step in result["steps"]), default=0.0)
     return shown | {"seconds": seconds, FLOATING: floating_mm(result["gaps_mm"]), LAST_FRAME: last}
 

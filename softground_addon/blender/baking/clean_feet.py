@@ -12,22 +12,23 @@ from numpy.typing import NDArray
 
 from ...core.composers.responses import CharacterResponse, standing_on
 from ...core.errors import InputError
+from ...core.legs.grounding import leg_soles, responding
+from ...core.legs.sole_rim import posed_rim
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.intervals import runs
-from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, standing
-from ...core.response.grounding import leg_soles, responding
+from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, resting, standing
 from ...core.response.response import at_scene_frames, gaps
-from ...core.response.sole_rim import posed_rim
 from ...core.settings import BakeSettings, CharacterSettings
 from .. import settings
+from ..animation_layer.constraint_layer import LayerKind
 from ..characters.character_setup import characters_of
-from ..characters.rest_pose import legs_of_feet, legs_on_shins
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
 from ..response.character_keys import ReadRig
+from ..rigs.rest_pose import legs_of_feet, legs_on_shins
 
 EXACT = 0.1
 """Keys are left out where straight lines stay within this part of the tolerance of other layers."""
@@ -75,20 +76,20 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     SoftGroundError
         If a shot cannot be read, or a rig cannot take the layer; nothing is changed then.
     """
-    if not any(character.armature for character in characters_of(scene)):
+    if not any(character.armature for character in characters_of(scene.softground)):
         raise InputError("No character here has feet to clean: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     assert wanted.response is not None
     characters = tuple(_with_legs(one) for one in wanted.characters)
     wanted = replace(wanted, response=replace(wanted.response, tilt=None), characters=characters)
     response_job.check_characters(wanted.characters)
-    shot = yield from read_shot(scene, wanted)
+    shot = yield from read_shot(scene, wanted, LayerKind.CLEAN_FEET)
     stood = standing_on.slices(shot.motions, shot.terrain, wanted.response)
     standing = yield from meanwhile(Progress("sample", 1.0), stood)
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
     cleaned, feet, missed = yield from _cleaned(wanted, shot, loads)
     layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)
-    response_job.put_layers(scene, wanted, layers)
+    response_job.put_layers(scene, wanted, layers, LayerKind.CLEAN_FEET)
     yield Progress("write", 1.0)
     return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
 
@@ -115,6 +116,7 @@ def _cleaned(
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        touching = resting(motion, touching, shot.terrain)
         stands = yield from meanwhile(now, standing.slices(motion, touching, shot.terrain, asked.holds))
         response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds, stands))
         missed += [

@@ -5,24 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
+from ...core.debris.debris import Debris
+from ...core.debris.thrown_debris import thrown
+from ...core.ground.soft_ground import SoftGround
+from ...core.loads.estimate import CharacterLoads
+from ...core.numerics.slices import Slices, sliced
 from ...core.playback.playback_curves import playback_curves_at
 from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
-from ...core.settings import BakeSettings
+from ...core.settings import Acts, BakeSettings
 from .. import settings
-from ..ground import baked_ground, display_key, ground_mesh, playback
+from ..debris import debris_object
+from ..ground import baked_ground, ground_mesh
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
+from ..playback import display_key, playback
 from ..reading import staleness
 
 Array = NDArray[np.float64]
@@ -30,8 +36,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Published:
-    """What carries a bake, and the largest error of the heights that it plays [m]."""
+    """The ground of a bake, what carries it, and the largest error of the heights that it plays [m]."""
 
+    ground: bpy.types.Object
     display_mesh: bpy.types.Object
     error: float
 
@@ -46,12 +53,32 @@ def at_the_end(made_with: BakeSettings) -> dict[str, float]:
     }
 
 
-def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> Job[Published]:
+@sliced
+def with_debris(
+    left: record.BakeRecord, ground: SoftGround, made_with: BakeSettings, loads: Sequence[CharacterLoads] | None = None
+) -> Slices[tuple[record.BakeRecord, Debris | None]]:
+    """A record with the debris of its steps booked, if asked for; see `core.debris.thrown_debris.thrown`."""
+    if loads is not None and not made_with.debris:
+        return left, None
+    throwing = thrown.slices(
+        left,
+        ground,
+        surface=made_with.surface,
+        cell_size=made_with.cell_size_m,
+        gravity=made_with.gravity_m_s2,
+        loads=loads,
+    )
+    return (yield from throwing)
+
+
+def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:
     """Let a ground play a record, as the artist's edits leave it. Nothing that the user sees changes before the end.
 
     Parameters
     ----------
     left : BakeRecord
+    debris : Debris or None
+        What its steps throw, from `with_debris`.
     place : Place
         Where it goes.
     made_with : BakeSettings
@@ -76,9 +103,10 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
         relief=relief,
     )
     spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
+    points = yield from meanwhile(Progress("write", 0.75), lines.position.unpacking())
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
-        table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines)))
-        del lines  # they are large, and all is in the table
+        table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines, points)))
+        del lines, points  # they are large, and all is in the table
         yield Progress("write", 0.8)
         marks = _tread(footprints, place.position, made_with, relief)
         yield Progress("write", 0.9)
@@ -109,33 +137,40 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
         if is_draft:
             yield Progress("write", 0.9)
         shown = show()
-    return Published(shown, error)
+    ground = settings.found(made_with.ground) if made_with.ground else shown
+    debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
+    return Published(ground, shown, error)
 
 
 def sign(
-    display_mesh: bpy.types.Object,
-    ground: bpy.types.Object,
-    inputs: Mapping[str, Any],
+    published: Published,
+    made_with: BakeSettings,
     hashes: Mapping[str, str],
     *,
     summary: Mapping[str, float],
     warnings: Sequence[str] = (),
+    stamp: str | None = None,
 ) -> None:
     """Note with what was published what the panel says of it, and what it was made from.
 
     Parameters
     ----------
-    display_mesh, ground : bpy.types.Object
-        What carries it, and the ground that it is of.
-    inputs, hashes
-        See `staleness.store`.
+    published : Published
+    made_with : BakeSettings
+    hashes : mapping of str to str
+        See `staleness.store`; of an edited bake, as `staleness.store_again` takes them.
     summary : mapping
         From `bake_report`.
     warnings : sequence of str
+    stamp : str, optional
+        That of the bake that was edited.
     """
-    ground_mesh.mesh_of(display_mesh)[ground_mesh.SUMMARY] = dict(summary)
-    ground_mesh.note_warnings(display_mesh, warnings)
-    staleness.store(inputs, ground, hashes)
+    ground_mesh.mesh_of(published.display_mesh)[ground_mesh.SUMMARY] = dict(summary)
+    ground_mesh.note_warnings(published.display_mesh, warnings)
+    if stamp is None:
+        staleness.store(made_with.inputs(Acts.WRITING), published.ground, hashes)
+    else:
+        staleness.store_again(published.ground, stamp, made_with.painted, hashes)
 
 
 def _tread(

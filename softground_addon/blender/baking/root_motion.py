@@ -14,19 +14,13 @@ from ...core.response.root_motion import lacking_velocity
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
 from .. import settings
-from ..animation_layer.layer_curves import LayerCurve
-from ..animation_layer.nla_layer import (
-    TRAVEL,
-    add_layer,
-    animated_paths,
-    check_layerable,
-    has_layer,
-    notes_of,
-    remove_layer,
-)
+from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.constraint_layer import LayerKind, check_layerable, notes_of, remove_layer
+from ..animation_layer.layer_curves import LayerCurve, path_of_bone
 from ..characters.character_setup import characters_of
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import estimate_shot, read_shot, settings_of
+from ..response.response_job import Layer, show_layer
 from ..response.rig_controls import travelling_bone
 
 Array = NDArray[np.float64]
@@ -70,13 +64,13 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     SoftGroundError
         If a shot cannot be read, nobody walks on the spot, or a rig cannot take the layer; nothing is changed then.
     """
-    if not any(character.armature for character in characters_of(scene)):
+    if not any(character.armature for character in characters_of(scene.softground)):
         raise InputError("No character here has a rig to move: add a character with an animated armature.")
     wanted = replace(settings_of(scene), response=None)
     for one in wanted.characters:
         if one.armature:
-            check_movable(settings.found(one.armature))
-    shot = yield from read_shot(scene, wanted)
+            check_layerable(settings.found(one.armature))
+    shot = yield from read_shot(scene, wanted, LayerKind.ROOT_MOTION)
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
     for one, motion, of_character in zip(wanted.characters, shot.motions, loads, strict=True):
@@ -90,48 +84,22 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         layers.append((one.armature, travel, curves))
     if not layers:
         raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
-    start, end = (frame * wanted.time_stretch for frame in wanted.frames)
     for name, travel, curves in layers:
         armature = settings.found(name)
-        remove_layer(armature)  # a response to a walk on the spot
-        add_layer(armature, curves, (start, end), {SPEED: f"{travel.speed:.4f}"}, TRAVEL)
+        for kind in LayerKind:  # the others were made for a walk on the spot
+            remove_layer(armature, kind)
+        layer = Layer(curves, {SPEED: f"{travel.speed:.4f}"})
+        show_layer(scene, armature, LayerKind.ROOT_MOTION, layer)
     yield Progress("write", 1.0)
     return tuple(travel for _, travel, _ in layers)
-
-
-def check_movable(armature: bpy.types.Object) -> None:
-    """Raise InputError, naming the remedy, where an armature can be given no travel."""
-    check_layerable(armature)
-    if armature.animation_data is not None and not armature.animation_data.use_nla:
-        raise InputError(
-            f"The NLA of '{armature.name}' is switched off, and travel would not show: switch it on beside the name in "
-            "the NLA editor."
-        )
 
 
 def speed_of(armature: bpy.types.Object) -> float:
     """Speed of the travel that an armature was given [m/s]; 0 where it was given none."""
     try:
-        return float(notes_of(armature, TRAVEL).get(SPEED, "0"))
+        return float(notes_of(armature, LayerKind.ROOT_MOTION).get(SPEED, "0"))
     except ValueError:
         return 0.0
-
-
-def remove_root_motion(scene: bpy.types.Scene) -> None:
-    """Take the travel off all armatures of the scene."""
-    for armature in _travelling(scene):
-        remove_layer(armature, TRAVEL)
-    for layer in scene.view_layers:
-        layer.update()
-
-
-def has_root_motion(scene: bpy.types.Scene) -> bool:
-    """Whether a character of the scene was given travel; quick enough for `poll`."""
-    return any(one.armature and has_layer(one.armature, TRAVEL) for one in scene.softground.characters)
-
-
-def _travelling(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    return [obj for obj in scene.objects if obj.type == "ARMATURE" and not obj.library and has_layer(obj, TRAVEL)]
 
 
 def _layer(
@@ -145,15 +113,10 @@ def _layer(
     assert character.armature
     armature = settings.found(character.armature)
     bone = _bone(scene, armature, RigMapping(character.joints, character.soles, "settings"))
-    if bone:
-        path = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'
-        frame = np.array(armature.matrix_world.to_3x3() @ armature.data.bones[bone].matrix_local.to_3x3())
-    else:
-        path = "location"
-        frame = np.array((armature.matrix_world @ armature.matrix_basis.inverted_safe()).to_3x3())
+    path = path_of_bone(bone, "location") if bone else "location"
     duration = (motion.frames[-1] - motion.frames[0]) / motion.frame_rate
     way = np.append(duration * velocity, 0.0) / wanted.unit_scale_m
-    ends = np.stack([np.zeros(3), np.linalg.solve(frame, way)])
+    ends = np.stack([np.zeros(3), way])
     frames = motion.frames[[0, -1]] * wanted.time_stretch
     curves = [LayerCurve(path, axis, bone or "Object Transforms", frames, ends[:, axis]) for axis in range(3)]
     return Travel(armature.name, bone or armature.name, float(np.linalg.norm(velocity))), curves

@@ -28,7 +28,7 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     SoftGroundError
         As `bake`, and if there is nobody with feet.
     """
-    if not any(character.armature for character in characters_of(scene)):
+    if not any(character.armature for character in characters_of(scene.softground)):
         raise InputError("No character here has feet to lower: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene, wanted)

@@ -11,22 +11,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.felt_weather import felt_in
-from ...core.after.thrown_debris import thrown_again
 from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
+from ...core.ground import surfaces
 from ...core.ground.material import Pressure
-from ...core.ground.presets import SURFACES, validate_material
+from ...core.ground.presets import validate_material
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
 from ...core.settings import Acts, BakeSettings
+from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
-from ..after import debris_object
+from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
 from . import bake_job, bake_report
+from .publish import sign, with_debris
 
 AROUND = 2.0
 """How far around the prints the ground is looked at, for those that are moved [m]."""
@@ -55,11 +56,16 @@ class EditableBake:
 
     def with_edits(self, edits: Mapping[str, StepEdit]) -> record.BakeRecord:
         """The record with other edits in place of those that it has."""
-        return self.steps.left_with(self.left, edits)
+        return EditedSteps.left_with(self.steps, self.left, edits)
 
 
 def editable(scene: bpy.types.Scene) -> EditableBake:
-    """The bake on the scene's ground, to be edited.
+    """The bake on the scene's ground, to be edited; errors as of `reading`."""
+    return jobs.run(reading(scene))
+
+
+def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
+    """The bake on the scene's ground, to be edited, in steps.
 
     Raises
     ------
@@ -70,9 +76,11 @@ def editable(scene: bpy.types.Scene) -> EditableBake:
     left = baked_ground.record_of(ground)
     made_with = _made_with(scene, left)
     names = painted_ground.names_of(ground, made_with.painted)
+    yield jobs.Progress("sample", 0.5)
     surface = ground_mesh.undisturbed_surface(ground, made_with.unit_scale_m, names)
     low, high = _extent(left)
-    terrain = ground_mesh.terrain_of(surface, np.stack([low - AROUND, high + AROUND]))
+    looking = ground_mesh.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
+    terrain = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), looking)
     shot = Shot((), low, high, None, surface, terrain)
     return EditableBake(
         left, made_with, shot, EditedSteps(left.footprints, ground_of(made_with, shot), made_with.cell_size_m)
@@ -80,7 +88,12 @@ def editable(scene: bpy.types.Scene) -> EditableBake:
 
 
 def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> None:
-    """Show the bake on the scene's ground with other edits; edits that change nothing of a baked step are dropped.
+    """Show the bake on the scene's ground with other edits; errors as of `editing`."""
+    jobs.run(editing(scene, bake, edits))
+
+
+def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> jobs.Job[None]:
+    """Show the bake on the scene's ground with other edits, in steps; those that change nothing of a step are dropped.
 
     Raises
     ------
@@ -88,29 +101,25 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
         If a step is to be moved of which the record keeps too little, or the ground cannot be written.
     """
     ground = scene.softground.ground
-    left = bake.with_edits({name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)})
+    edits = {name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)}
+    pressing = EditedSteps.left_with.slices(bake.steps, bake.left, edits)
+    left = yield from jobs.meanwhile(jobs.Progress("simulate", 0.5), pressing)
     shown, stamp = baked_ground.display_mesh_of(ground), staleness.stamp_of(ground)
     warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)
     lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]
     sole_length = min(lengths, default=FALLBACK_SOLE)
-    surface, is_deleted = str(left.about["inputs"]["surface"]), bool(left.thrown) and debris_object.of(ground) is None
-    debris = None
-    if left.throws:
-        left, debris = thrown_again(
-            left,
-            ground_of(bake.made_with, bake.shot),
-            surface=surface,
-            cell_size=bake.made_with.cell_size_m,
-            gravity=bake.made_with.gravity_m_s2,
-        )
-    written = jobs.run(bake_job.write_prints(scene, bake.made_with, bake.shot, left, sole_length))
-    if left.throws and not is_deleted:
-        debris_object.put(ground, debris, surface=surface, units=bake.made_with)
-    renewed = summary | bake_report.summary_of_prints(left.edited)
-    ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
-    ground_mesh.note_warnings(written.display_mesh, warnings)
-    staleness.store_again(
-        scene.softground.ground, stamp, bake.made_with.painted, _sole_hashes(scene, stamp, bake, edits)
+    is_deleted = bool(left.thrown) and debris_object.of(ground) is None
+    throwing = with_debris.slices(left, ground_of(bake.made_with, bake.shot), bake.made_with)
+    left, debris = yield from jobs.meanwhile(jobs.Progress("simulate", 1.0), throwing)
+    debris = None if is_deleted else debris
+    published, _ = yield from bake_job.write_prints(scene, bake.made_with, bake.shot, left, debris, sole_length)
+    sign(
+        published,
+        bake.made_with,
+        _sole_hashes(scene, stamp, bake, edits),
+        summary=summary | bake_report.summary_of_prints(left.edited),
+        warnings=warnings,
+        stamp=stamp,
     )
 
 
@@ -130,19 +139,17 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
     now = settings.snapshot(scene)
     try:
         inputs = left.about["inputs"]
-        on_ground = {
-            name: type(value)(inputs[name])
-            for name, value in now.between(Acts.WRITING, Acts.WRITING).items()
-            if name in inputs
-        }
+        on_ground = {name: type(value)(inputs[name]) for name, value in now.between(Acts.WRITING, Acts.WRITING).items()}
         units = baked_ground.units_of(inputs)
-        if inputs["surface"] not in SURFACES or inputs["pressure"] not in get_args(Pressure):
-            raise ValueError("there is no such surface, or no such pressure")
+        surfaces.find(inputs["surface"])
+        if inputs["pressure"] not in get_args(Pressure):
+            raise ValueError("there is no such pressure")
         stiffness, layer_depth, rim = map(str, inputs["painted"])
         return replace(
             now,
             **on_ground,
             material=validate_material(inputs["material"], "record"),
+            surface=inputs["surface"],
             pressure=inputs["pressure"],
             painted=(stiffness, layer_depth, rim),
             frames=baked_ground.frames_of(inputs),
@@ -151,7 +158,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             time_stretch=units["time_stretch"],
             gravity_m_s2=units["gravity_m_s2"],
             unit_scale_m=units["unit_scale_m"],
-            shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs.get("shoe_treads", ())),
+            shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
         )
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, InputError):

@@ -8,14 +8,18 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.ground.heightfield import Window
+from ...core.ground.sparse_grid import Window
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from .. import session, settings
-from ..ground import baked_ground, display_key, ground_mesh, playback
+from ..debris import debris_object
+from ..ground import baked_ground, ground_mesh
+from ..playback import display_key, playback
 from .publish import at_the_end
 from .step_edits import EditableBake
+
+Array = NDArray[np.float64]
 
 REACH = 4.0
 """How far around a print the display blur spreads it, in its standard deviations."""
@@ -40,6 +44,8 @@ class StepPreview:
         self._before = ground_mesh.displayed_positions(shown)
         self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
         self._changed: list[Window] = []
+        debris = debris_object.of(ground)
+        self._pieces = debris_object.Pieces(debris, unit_scale) if debris else None
         self._hidden = [modifier.name for modifier in shown.modifiers if modifier == playback.modifier_of(shown)]
         self._show_playback(False)
         session.show_preview(True)
@@ -48,32 +54,37 @@ class StepPreview:
         """Show the ground with these edits."""
         left = self._bake.with_edits(edits)
         windows = _windows(self._bake.left.footprints, self._bake.left.pressed_again, left.pressed_again)
-        near = self._within([*windows, *self._changed])
+        near = np.flatnonzero(self._within([*windows, *self._changed], self._x, self._y))
         self._changed = windows
         positions = self._before.copy()
         made_with = self._bake.made_with
         sample = sample_at(left.edited, self._x[near], self._y[near], **at_the_end(made_with))
         positions[near] = self._rest[near] + (sample.display[:, None] * self._up).astype(np.float32)
         self._write(positions)
+        if self._pieces:  # of those that move, and on ground that moves: they are thrown anew once the step is let go
+            before = {step.index: step.edit for step in self._bake.left.steps}
+            changed = [step.index for step in left.steps if step.edit != before.get(step.index)]
+            place = self._pieces.place.T
+            self._pieces.hide(np.isin(self._pieces.step, changed) | self._within(windows, *place))
 
     def end(self) -> None:
         """Show the bake as it was."""
         session.show_preview(False)
         self._write(self._before)
+        if self._pieces:
+            self._pieces.hide(np.zeros(len(self._pieces.step), bool))
         self._show_playback(True)
 
-    def _within(self, windows: list[Window]) -> NDArray[np.intp]:
-        """Vertices that some windows may move."""
-        if not windows:
-            return np.zeros(0, np.intp)
+    def _within(self, windows: list[Window], x: Array, y: Array) -> NDArray[np.bool_]:
+        """Which of some places (N,) [m] are on ground that some windows may move."""
         size = self._bake.made_with.cell_size_m
         margin = REACH * self._bake.made_with.material.blur_sigma
-        inside = np.zeros(len(self._x), bool)
+        inside = np.zeros(len(x), bool)
         for window in windows:
             low, high = window.corners(size)
             low, high = low - margin, high + margin
-            inside |= (self._x >= low[0]) & (self._x <= high[0]) & (self._y >= low[1]) & (self._y <= high[1])
-        return np.flatnonzero(inside)
+            inside |= (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+        return inside
 
     def _write(self, positions: NDArray[np.float32]) -> None:
         mesh = ground_mesh.mesh_of(settings.found(self._name))

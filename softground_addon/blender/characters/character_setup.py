@@ -4,24 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import ceil, floor, log10
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.motion import scale_to_metres, shortest_length
 from ...core.motion.props import mass_properties
+from ...core.motion.sole_motion import shortest_length
+from ...core.motion.units import scale_to_metres
 from ...core.numerics.components import components
 from ...core.rig.mapping import RigMapping
 from .. import jobs
 from ..properties import SoftGroundCharacter
+from ..rigs.frame_ranges import ancestors, animated_frames
+from ..rigs.libraries import check_libraries
+from ..rigs.rig_mapping import CHOOSE_CONTACTS, require_armature
+from ..sampling.prop_extraction import surface_of
+from ..sampling.rig_sampling import is_simulated, recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
-from .frame_ranges import ancestors, animated_frames
-from .import_fixes import put_under, size_of
-from .prop_extraction import surface_of
+from .import_fixes import put_under, size_of, stature_of
 from .recognition import SHARE, Recognised, recognise
-from .rig_mapping import CHOOSE_CONTACTS, require_armature
-from .rig_sampling import is_simulated, recorded_motion, sample_character
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
@@ -118,9 +121,9 @@ POSE_TIME = 1.0
 
 def _fit_ground(scene: bpy.types.Scene) -> None:
     """Let the ground fit a character that was just added: by the default preset if it is the first."""
-    if len(characters_of(scene)) == 1:
-        take_defaults(scene)
-    fit_cells(scene)
+    if len(characters_of(scene.softground)) == 1:
+        take_defaults(scene.softground)
+    fit_cells(scene.softground)
 
 
 DENSITY = 500.0
@@ -171,6 +174,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
 
 
 def _check_printable(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    check_libraries(obj)
     if obj.type != "MESH":
         raise InputError(
             f"'{obj.name}' is not a mesh but of type {obj.type.title()}: select an animated armature, or mesh "
@@ -216,12 +220,12 @@ def _moving_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, 
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
     """Bake the frames of the first character; widen the range for further ones."""
     if not frames:
-        if len(characters_of(scene)) == 1:
+        if len(characters_of(scene.softground)) == 1:
             scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
         return
     settings = scene.softground
     start, end = _frames_of_scene(scene, frames)
-    if len(characters_of(scene)) > 1:
+    if len(characters_of(scene.softground)) > 1:
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end
     settings.animated_frames = start, end
@@ -236,16 +240,17 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
         If its size needs no change, or it is linked.
     """
     armature = character.armature
-    factor = scale_to_metres(character.size)
+    size = stature_of(scene, armature) if armature else 0.0
+    factor = scale_to_metres(size)
     if armature is None or factor == 1.0:
-        raise InputError(f"'{title_of(character)}' is {character.size:.2g} m in size: its scale needs no fix.")
+        raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
     put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3
     by_volume = character.mass == character.skin_mass
     character.size, character.sole_length = character.size * factor, character.sole_length * factor
     character.skin_mass = float(f"{character.skin_mass * factor**3:.2g}")
     if by_volume:
         character.mass = character.skin_mass
-    fit_cells(scene)
+    fit_cells(scene.softground)
     return factor
 
 
@@ -390,6 +395,6 @@ def title_of(character: SoftGroundCharacter) -> str:
     return character.armature.name if character.armature else character.name
 
 
-def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
+def characters_of(options: Any) -> list[SoftGroundCharacter]:
     """The scene's characters whose armature or objects are still there."""
-    return [character for character in scene.softground.characters if is_set_up(character)]
+    return [character for character in options.characters if is_set_up(character)]

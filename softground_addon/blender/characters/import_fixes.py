@@ -7,18 +7,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.rig.bones import extent, stature
 from ..compat import action_curves
+from ..rigs.frame_ranges import ancestors
+from ..sampling.skin_sampling import meshes_on
 from ..settings import frame_rate_of, time_stretch_of
-from .frame_ranges import ancestors
-from .skin_sampling import meshes_on
 
 
 def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
     """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog; 0 without bones."""
+    return extent(_heads(armature), np.array(armature.matrix_world)) * scene.unit_settings.scale_length
+
+
+def stature_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
+    """Its `CharacterMotion.stature` as it stands now [m]; 0 without bones."""
+    return stature(_heads(armature), np.array(armature.matrix_world)) * scene.unit_settings.scale_length
+
+
+def _heads(armature: bpy.types.Object) -> NDArray[np.float64]:
     bones = armature.data.bones if armature.data else ()  # a linked rig whose library is gone has no data
-    heads = np.array([bone.head_local for bone in bones]).reshape(-1, 3)
-    in_world = heads @ np.array(armature.matrix_world)[:3, :3].T * scene.unit_settings.scale_length
-    return float(np.ptp(in_world, axis=0).max()) if len(heads) else 0.0
+    heads = np.zeros((len(bones), 3), dtype=np.float32)
+    if len(bones):
+        bones.foreach_get("head_local", heads.reshape(-1))
+    return heads.astype(float)
 
 
 def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> bpy.types.Object:

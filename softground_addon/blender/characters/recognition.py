@@ -21,10 +21,10 @@ from ...core.rig.sole_extraction import bone_families
 from ...core.settings import SoleSource
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
+from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
+from ..sampling.rig_sampling import is_animated, record
+from ..sampling.skin_sampling import read_skin
 from ..settings import found, name_of, units_of
-from .rig_mapping import map_rig, require_armature, rest_bones
-from .rig_sampling import is_animated, record
-from .skin_sampling import read_skin
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
@@ -97,7 +97,8 @@ def recognise(
     if frames and moves:
         first, last = (round(frame / units.time_stretch) for frame in frames)
         samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units)
+    shapes = [shape.key for shape in skin.shapes]
+    reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units, shapes=shapes)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     bones = rest_bones(found(rig))
     weighing = skin_mass.slices(skin, bones, recording.of(np.array([0])))
@@ -105,7 +106,7 @@ def recognise(
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
     seen = yield from jobs.meanwhile(read, _shown_by_skin(bones, skin, recording))
-    return Recognised(replace(_joined(bones, mapping, seen), mass=mass), skin, recording)
+    return Recognised(replace(_joined(bones, skin, mapping, seen), mass=mass), skin, recording)
 
 
 def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
@@ -116,13 +117,21 @@ def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
         return RigMapping(method="skin")
 
 
-def _joined(bones: RigBones, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
+def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
     """What the names say with the skin's parts, and what only the skin shows: beside feet, hands and other limbs.
+
+    Feet that are named and have no skin, as bones for inverse kinematics, are none where as many others show, or the
+    skin of legs.
 
     Legs that the rest pose alone tells are none if the character bears on other parts, and never on these.
     """
     soles, left = [], list(seen)
+    bare = [source for source in mapping.soles if not skin.weight_of(bone_families(bones, source)[0]).any()]
+    legs = {bone for joint, (bone, _) in mapping.joints.items() if joint.startswith(("hip_", "knee_", "ankle_"))}
+    shows_legs = len(seen) >= len(bare) or any(legs & {*contact.parts} for contact in seen)
     for source in mapping.soles:
+        if source in bare and shows_legs:
+            continue
         family, _ = bone_families(bones, source)
         same = [contact for contact in left if family & {*contact.parts}]
         left = [contact for contact in left if contact not in same]
@@ -130,7 +139,7 @@ def _joined(bones: RigBones, mapping: RigMapping, seen: tuple[SoleSource, ...]) 
         soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))
     if mapping.method == "rest pose" and left == list(seen) != []:
         return RigMapping(soles=seen, method="skin")
-    others = (replace(contact, limb=contact.limb or bool(soles)) for contact in left)
+    others = (replace(contact, limb=contact.limb or bool(mapping.soles)) for contact in left)
     return replace(mapping, soles=(*soles, *others))
 
 

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 import bpy
 
 from ...core.errors import InputError
+from ..rigs.frame_ranges import ancestors, leaders
+from ..rigs.rig_mapping import instances_armature, parts_of, require_armature
+from ..sampling.instances import crowd_finding, instancers
+from ..sampling.rig_sampling import is_animated, is_simulated
+from ..sampling.skin_sampling import meshes_on
 from .character_setup import add_character
-from .frame_ranges import ancestors, leaders
-from .rig_mapping import instances_armature, require_armature
-from .rig_sampling import is_animated, is_simulated
-from .skin_sampling import meshes_on
 
 
 def chosen(
@@ -30,6 +31,8 @@ def chosen(
     picked = list(dict.fromkeys(obj for obj in (active, *selected) if obj is not None))
     known = {character.armature for character in scene.softground.characters}
     rigs = list(dict.fromkeys(skin_rig(scene, rig) for obj in picked for rig in _rigs_of(obj, known)))
+    if not rigs:
+        _check_no_crowd(scene, picked)
     fresh = [rig for rig in rigs if rig not in known]
     props = [obj for obj in picked if obj.type == "MESH" and not _rigs_of(obj, known)]
     moving = [obj for obj in props if moves(obj)]
@@ -38,6 +41,9 @@ def chosen(
     if fresh or moving:
         return fresh, moving if fresh else props
     walkers = [rig for rig in walkers_of(scene) if rig not in known]
+    for obj in picked:
+        if any(map(moves, parts_of(obj))):
+            require_armature(obj)
     if len(walkers) == 1:
         return walkers, []
     if not props:
@@ -45,6 +51,15 @@ def chosen(
             raise InputError(f"Several rigs move here ({_names(walkers)}): select those that walk.")
         require_armature(active)
     return [], props
+
+
+def _check_no_crowd(scene: bpy.types.Scene, picked: Sequence[bpy.types.Object]) -> None:
+    """Raise InputError where an object shows figures that have no rig of their own."""
+    bodies = [obj for obj in scene.objects if obj.type == "MESH" and obj not in picked and obj.find_armature()]
+    showing = instancers(scene, bodies)
+    for obj in picked:
+        if obj.name in showing:
+            raise InputError(crowd_finding([obj.name], showing[obj.name]).text)
 
 
 def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
@@ -80,12 +95,12 @@ def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Ob
     followers = [
         other
         for other in scene.objects
-        if other.type == "ARMATURE" and armature in _all_leaders(other) and meshes_on(scene, other)
+        if other.type == "ARMATURE" and armature in all_leaders(other) and meshes_on(scene, other)
     ]
     return followers[0] if len(followers) == 1 else armature
 
 
-def _all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
+def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
     """What an object follows by its constraints and parents, and what those follow."""
     found: set[bpy.types.Object] = set()
     waiting = [obj]

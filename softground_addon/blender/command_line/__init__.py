@@ -1,1 +1,1 @@
-"""`softground bake`, `softground batch` and the others."""
+"""The commands `softground bake`, `clean`, `export` and `batch`."""

@@ -22,10 +22,11 @@ from ...core.files import files, report
 from ...core.ground import presets
 from ...core.record.archive import LARGEST_TEXT
 from ...core.record.edits import StepEdit, from_json
-from .. import jobs, settings
-from ..baking import bake_job, clean_feet, root_motion
+from .. import jobs, setting_paths, settings
+from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
 from ..output import export_formats
+from ..response import response_job
 from ..settings import user_folder
 from . import cli_arguments, program
 
@@ -50,9 +51,9 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
 
 
 class _Unbroken(io.TextIOBase):
-    """An output that goes on where nobody reads it any more, as before `| head`, or where it has no room or no letter.
+    """An output that survives a closed pipe, as before `| head`, a full disk, or a letter that it cannot encode.
 
-    On Windows a pipe takes the letters of one code page only, unless Python is told otherwise.
+    On Windows a pipe takes the letters of one code page only, unless Python is set otherwise.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -120,7 +121,7 @@ def _is_text(argument: str) -> bool:
 
 def _interrupt(_number: int, _frame: object) -> None:
     for number in _INTERRUPTS:
-        signal.signal(number, signal.SIG_IGN)  # once is enough: what follows is the cleaning up
+        signal.signal(number, signal.SIG_IGN)  # once is enough: the cleaning up follows
     raise KeyboardInterrupt
 
 
@@ -147,15 +148,21 @@ def _bake(options: argparse.Namespace) -> None:
     edits = _edits(options.edits) if options.edits else None
     set_up_automatically(scene)
     if options.preset:
-        settings.apply_preset(scene, _preset(options.preset))
+        settings.apply_preset(scene.softground, _preset(options.preset))
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
     if options.cell_size is not None:
-        settings.assign(scene.softground, "cell_size", str(options.cell_size))
+        setting_paths.assign(scene.softground, "cell_size", str(options.cell_size))
     for path, value in options.overrides:
-        settings.assign(scene.softground, path, value)
+        setting_paths.assign(scene.softground, path, value)
+    if options.response and not scene.softground.grounding.use:
+        scene.softground.sink_feet = True
     show = _ending_with(options.parent, _PROGRESS[options.progress])
     result = jobs.run(bake_job.bake(scene, write=not options.dry_run, edits=edits), show)
+    if options.response == "keys" and not options.dry_run and response_job.has_layers(scene.softground):
+        for made in jobs.run(make_keys.make_keys(scene)):
+            if made.warning:
+                print(f"softground: {made.warning}", file=sys.stderr)
     _write_results(options, target, result.report, read)
     if options.progress == "json":
         said = {"stage": "done", "fraction": 1.0, "overall": 1.0, "totals": result.report["totals"]}
@@ -195,13 +202,14 @@ def _export(options: argparse.Namespace) -> None:
         _open(options.blend)
     scene = _scene(options.scene)
     kind = options.format.upper().replace("-", "_")
-    path = options.output.absolute() if options.output else export_formats.default_path(scene, kind)
+    asked = options.output.absolute() if options.output else export_formats.default_path(scene, kind)
+    path = export_formats.check_suffix(asked, kind)
     start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
     if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:
         raise InputError(f"--resolution takes a number from 1 to {export_formats.LARGEST_IMAGE}.")
     how = export_formats.Options(
         kind,
-        export_formats.with_suffix(path, kind),
+        path,
         start,
         end,
         options.resolution,
@@ -226,7 +234,7 @@ def _ending_with(parent: int, show: Callable[[jobs.Progress], None]) -> Callable
 
 
 def _files_read(options: argparse.Namespace) -> list[Path]:
-    """The opened file, what it links, and the preset file."""
+    """The opened file, the files that it links, and the preset file."""
     linked = [(item.filepath, item.library) for item in (*bpy.data.libraries, *bpy.data.cache_files)]
     paths = [bpy.path.abspath(path, library=library) for path, library in linked]
     if options.preset and options.preset.lower().endswith(".json"):
@@ -240,7 +248,7 @@ def _write_results(
     options: argparse.Namespace, target: Path | None, content: dict[str, Any], read: dict[str, str]
 ) -> None:
     """Write all results whole under other names, and then give them their names: the receipt, which is proof, last."""
-    with contextlib.ExitStack() as results:  # which ends with what it began with
+    with contextlib.ExitStack() as results:  # at its end the files get their names
         receipt = results.enter_context(files.replacing(options.receipt)) if options.receipt else None
         wrote: dict[Path, Path] = {}
         if target and not options.dry_run:
@@ -286,7 +294,7 @@ def _edits(path: Path) -> dict[str, StepEdit]:
     Raises
     ------
     InputError
-        If it cannot be read, or says what cannot be meant.
+        If it cannot be read, or makes no sense.
     """
     try:
         content = json.loads(files.read_regular(path, LARGEST_TEXT))
@@ -307,7 +315,7 @@ def _preset(name_or_path: str) -> presets.Preset:
 
 
 def _save_target(options: argparse.Namespace) -> Path | None:
-    """Where the shot goes."""
+    """File that the shot is saved to."""
     if options.in_place:
         if not bpy.data.filepath:
             raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
@@ -331,7 +339,7 @@ def _check_places(options: argparse.Namespace, target: Path | None) -> None:
 
 
 def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
-    """This bake as a manifest would say it."""
+    """This bake as an entry of a manifest."""
     return BatchShot(
         name="",
         file=Path(bpy.data.filepath),

@@ -1,4 +1,4 @@
-"""What may be typed after `softground`: the options of `bake`, `clean`, `export` and `batch`."""
+"""Arguments of `softground`: the options of `bake`, `clean`, `export` and `batch`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def parse(arguments: Sequence[str], *, standalone: bool) -> argparse.Namespace:
     Parameters
     ----------
     arguments : sequence of str
-        What follows `softground`.
+        Words after `softground`.
     standalone : bool
-        Whether the shot is named among them, as there is no Blender that has opened it.
+        True if they include the shot, as there is no Blender that has opened it.
 
     Raises
     ------
     SystemExit
-        After the help, or what is wrong and how it should be, was printed.
+        After the help, or the problem and its remedy, was printed.
     """
     return _parser(standalone=standalone).parse_args(_with_frames_joined(arguments))
 
@@ -65,6 +65,11 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
         help="a setting under scene.softground, e.g. material.youngs_modulus=4e5; may be repeated",
     )  # fmt: skip
     bake.add_argument("--edits", type=Path, metavar="FILE.json", help="changes of single steps, by the report's ids")
+    bake.add_argument(
+        "--response",
+        choices=("layer", "keys"),
+        help="lower the feet into their prints: as a layer, or in the keys of a new action",
+    )
     destination = bake.add_mutually_exclusive_group()
     destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
     destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
@@ -103,7 +108,8 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     export.add_argument("--format", required=True, type=_format, choices=formats, help="kind of file")
     export.add_argument(
         "--output", type=Path, metavar="FILE",
-        help="output file; for images, a folder and how their names begin (default: beside the shot)",
+        help="output file, with the format's suffix or none; for images, a folder and how their names begin "
+        "(default: beside the shot)",
     )  # fmt: skip
     export.add_argument(
         "--frames", type=_frame_range, metavar="A-B", help="first and last frame (default: those of the bake)"

@@ -1,4 +1,4 @@
-"""The program that we run in: what it is, and how it is started again to bake one shot."""
+"""The program that we run in: its versions, and the command that starts it again to bake one shot."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from typing import Any
 
 import bpy
 
+from .. import compat
+
 PACKAGE = Path(__file__).parents[3]
 """The folder of the extension, with its manifest."""
 
 
 def about() -> dict[str, Any]:
-    """What the extension's manifest says of it."""
+    """The extension's manifest."""
     return tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
 def made_by() -> str:
     """The programs that decide what a bake gives: SoftGround and Blender, with their versions."""
-    return f"SoftGround {about()['version']}, Blender {bpy.app.version_string}"
+    return f"SoftGround {about()['version']}, Blender {compat.VERSION}"
 
 
 def worker_command(shot: Path, options: Sequence[str]) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,19 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.manifest import FRAME_LIMIT
-from ...core.after.events import Event, as_edited
 from ...core.errors import InputError
-from ...core.ground.material import MATERIAL_RANGES
+from ...core.events.events import Event, as_edited
+from ...core.ground.material import MATERIAL_RANGES, OFF
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
-from ...core.record.edits import StepEdit
+from ...core.record.edits import StepEdit, with_names
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample, Trail
 from ...core.settings import ObjectName
-from ..after import debris_object
+from ..debris import debris_object
 from ..jobs import Job, Progress
-from ..settings import found, name_of
-from . import created_ground, ground_checks, ground_mesh, hidden_ground, own_data, playback, trail_detail
+from ..playback import own_data, playback
+from ..settings import exists, found, name_of
+from . import created_ground, ground_checks, ground_mesh, hidden_ground, trail_detail
 from .created_ground import Layout
 
 Array = NDArray[np.float64]
@@ -71,6 +72,11 @@ def display_mesh_of(ground: bpy.types.Object) -> bpy.types.Object:
 def is_baked(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground."""
     return ground_mesh.is_baked(display_mesh_of(ground))
+
+
+def is_deleted(ground: bpy.types.Object) -> bool:
+    """True if the ground, or the copy of it that carried its bake, was deleted in the viewport."""
+    return not exists(ground) or trail_detail.was_deleted(ground)
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
@@ -262,7 +268,7 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     Raises
     ------
     InputError
-        If there is no bake, or it was made before there were events.
+        If there is no bake, or its record has no events.
     """
     left = record_of(ground)
     table = left.about.get(EVENTS)
@@ -282,12 +288,19 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
     return [step for step in record_of(ground).steps if step.left]
 
 
-def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:
-    """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read."""
+def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str, StepEdit]:
+    """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read.
+
+    `names` are those that its characters have now, if the ids are to have these.
+    """
     try:
-        return record_of(ground).edits
+        left = record_of(ground)
     except InputError:
         return {}
+    with suppress(KeyError, TypeError, ValueError):  # of damaged inputs, and where there are more or fewer by now
+        before = [str(one["name"]) for one in left.about["inputs"]["characters"]]
+        return with_names(left.edits, dict(zip(before, names, strict=True)))
+    return left.edits
 
 
 def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:
@@ -328,7 +341,7 @@ def baked_with(about: Mapping[str, Any], value: str) -> float:
     """
     least, most = MATERIAL_RANGES[value]
     try:
-        number = float(about["inputs"]["material"][value])
+        number = float({**OFF, **about["inputs"]["material"]}[value])
     except (KeyError, TypeError, ValueError, OverflowError):
         number = float("nan")
     if not least <= number <= most:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
-from ...core.ground.heightfield import Terrain
 from ...core.ground.material import GroundMaterial
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
+from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings
-from ..settings import find, name_of
-from .camera_reach import near_camera
+from ..drafts import none_left_if_it_fails
+from ..materials.materials import EDGE, ensure_material
+from ..mesh_arrays import add_faces
+from ..settings import find, found, name_of
 from .ground_mesh import discard, mesh_of, write_positions
-from .materials import EDGE, ensure_material
 
 Array = NDArray[np.float64]
 
@@ -56,57 +57,27 @@ class Layout:
     face_size: NDArray[np.intp]
 
 
-def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
+def laid_out(wanted: BakeSettings, plan: GroundPlan) -> Slices[Layout]:
+    """The ground that is to be made for a plan: with its margin, and fine where the camera comes close."""
+    return lay_out.slices(
+        plan.widened(wanted.margin_m, wanted.camera),
+        wanted.cell_size_m,
+        wanted.unit_scale_m,
+        reach=reach_of(wanted.material),
+        close_up=_close_up(wanted, plan),
+    )
+
+
+def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, layout: Layout) -> bpy.types.Object:
     """A new ground with the material of the preset, set as the scene's ground."""
-    wide = widened(scene, plan, wanted.margin_m)
-    close_up = close_up_of(scene, wanted, plan)
-    reach = reach_of(wanted.material)
-    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach, close_up=close_up)
     with draft(layout, soft_edge(wanted.margin_m)) as ground:
         publish(scene, ground, wanted.surface)
     return ground
 
 
-FARTHEST = 30.0
-"""How far a ground reaches beyond the walk where the camera sees far [m]."""
-
-
-def widened(scene: bpy.types.Scene, plan: GroundPlan, margin: float) -> GroundPlan:
-    """A plan that reaches further: by a margin [m] on all sides, and over what the scene's camera sees of it.
-
-    Without a margin it stays as narrow as it is.
-    """
-    if not margin > 0:
-        return plan
-    seen = _seen(scene, (plan.lower + plan.upper) / 2, plan.terrain)
-    near = np.stack([plan.lower - margin, plan.upper + margin])
-    seen = np.clip(seen, near[0] - FARTHEST, near[1] + FARTHEST)
-    places = np.concatenate([near, seen])
-    return replace(plan, lower=places.min(axis=0), upper=places.max(axis=0))
-
-
 def soft_edge(margin: float) -> float:
     """Width of the edge over which a ground with some margin ends softly [m]."""
     return margin / 2
-
-
-def _seen(scene: bpy.types.Scene, middle: Array, terrain: Terrain) -> Array:
-    """Where the corners of the camera's picture lie on the ground, (N, 2) [m]; far away for those above the horizon."""
-    camera = scene.camera
-    if camera is None or not isinstance(camera.data, bpy.types.Camera):
-        return np.zeros((0, 2))
-    scale = scene.unit_settings.scale_length
-    matrix = np.array(camera.matrix_world)
-    corners = np.array(camera.data.view_frame(scene=scene)) @ matrix[:3, :3].T + matrix[:3, 3]
-    if camera.data.type == "ORTHO":
-        origin, ray = corners * scale, np.broadcast_to(-matrix[:3, 2], (4, 3))
-    else:
-        origin, ray = np.broadcast_to(matrix[:3, 3] * scale, (4, 3)), corners - matrix[:3, 3]
-    height = float(terrain.heights(*middle[:, None])[0])
-    down = ray[:, 2] < 0
-    far = 2 * FARTHEST / np.maximum(np.linalg.norm(ray[:, :2], axis=1), 1e-9)
-    reach = np.where(down, (height - origin[:, 2]) / np.where(down, ray[:, 2], -1.0), far)
-    return np.asarray(origin[:, :2] + np.clip(reach, 0.0, far)[:, None] * ray[:, :2])
 
 
 def reach_of(material: GroundMaterial) -> float:
@@ -133,17 +104,20 @@ class CloseUp:
     vertices: int
 
 
-def close_up_of(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> CloseUp | None:
+def _close_up(wanted: BakeSettings, plan: GroundPlan) -> CloseUp | None:
     """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
     if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
         return None
-    near = near_camera(scene, plan.footfalls, wanted.spacing_m)
+    near = np.ones(len(plan.footfalls), bool)
+    if wanted.camera is not None:
+        near = wanted.camera.is_near(plan.footfalls, wanted.spacing_m)
     return CloseUp(wanted.spacing_m, near, wanted.relief_vertices)
 
 
+@sliced
 def lay_out(
     plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: float = 0.0, close_up: CloseUp | None = None
-) -> Layout:
+) -> Slices[Layout]:
     """A plane ground whose vertices sit on the centres of the cells.
 
     Parameters
@@ -158,10 +132,12 @@ def lay_out(
         How far beyond the footfalls it is fine [m].
     close_up : CloseUp, optional
     """
-    grid, spacing = _graded(plan, cell_size, reach, close_up)
+    grid, spacing = yield from _graded(plan, cell_size, reach, close_up)
+    yield
     place = (grid.vertices + 0.5) * spacing
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
     centre = np.append(middle, plan.terrain.heights(*middle))
+    yield
     local = ((np.column_stack([place, plan.terrain.heights(*place.T)]) - centre) / unit_scale).astype(np.float32)
     location = (centre / unit_scale).astype(np.float32)
     vertices = (local.astype(np.float64) + location) * unit_scale
@@ -174,47 +150,48 @@ def draft(layout: Layout, edge: float = 0.0) -> Iterator[bpy.types.Object]:
 
     Its material fades out over the width of its edge [m].
     """
+    name = name_of(_built(layout, edge))
+    try:
+        yield found(name)
+    finally:
+        if (left := find(name)) is not None and not left.users_collection:
+            discard(left)
+
+
+@none_left_if_it_fails()
+def _built(layout: Layout, edge: float) -> bpy.types.Object:
     mesh = bpy.data.meshes.new("SoftGround")
     mesh.vertices.add(len(layout.local))
-    mesh.loops.add(len(layout.corner_vertex))
-    mesh.loops.foreach_set("vertex_index", layout.corner_vertex.astype(np.int32))
-    mesh.polygons.add(len(layout.face_size))
-    mesh.polygons.foreach_set("loop_start", (np.cumsum(layout.face_size) - layout.face_size).astype(np.int32))
-    write_positions(mesh, layout.local)
+    write_positions(mesh, layout.local)  # before there are faces, which it would look at
+    add_faces(mesh, layout.corner_vertex, np.cumsum(layout.face_size) - layout.face_size)
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
     uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
     layer = mesh.uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
     layer.uv.foreach_set("vector", (uv / uv.max())[layout.corner_vertex].ravel())
     if edge > 0:
-        place = layout.vertices[:, :2]
-        inward = np.minimum(place - place.min(axis=0), place.max(axis=0) - place).min(axis=1)
+        inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
         fading = mesh.attributes.new(EDGE, "FLOAT", "POINT")
         fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
-        del fading
     ground = bpy.data.objects.new("SoftGround", mesh)
     ground.location = layout.location.tolist()
-    name = name_of(ground)
-    del mesh, layer
-    try:
-        yield ground
-    finally:
-        if (left := find(name)) is not None and not left.users_collection:
-            discard(left)
+    return ground
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:
-    """Put a draft into a scene as its ground, with the render material of some surface: as what was made last, selected
-    and in the active collection."""
+    """Put a draft into a scene as its ground, in the active collection, with the render material of some surface."""
     mesh_of(ground).materials.append(ensure_material(surface))
-    layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
-    assert layer is not None
-    active = layer.active_layer_collection
+    active = _layer_of(scene).active_layer_collection
     shown = active is not None and active.is_visible and active.collection.is_editable
     (active.collection if active and shown else scene.collection).objects.link(ground)
     scene.softground.ground = ground
     for one in scene.view_layers:
         one.update()
+
+
+def select(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
+    """Select a ground alone, as what was made last, unless somebody edits or poses."""
+    layer = _layer_of(scene)
     if layer.objects.active is None or layer.objects.active.mode == "OBJECT":
         for other in list(layer.objects.selected):
             other.select_set(False, view_layer=layer)
@@ -222,7 +199,15 @@ def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> N
         layer.objects.active = ground
 
 
-def _graded(plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp | None) -> tuple[GradedGrid, float]:
+def _layer_of(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+    assert layer is not None
+    return layer
+
+
+def _graded(
+    plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp | None
+) -> Slices[tuple[GradedGrid, float]]:
     """The grid in whole spacings, its vertices in the middle of the cells, and the spacing [m]."""
 
     def corners(spacing: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -232,7 +217,7 @@ def _graded(plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp 
     if plan.footfalls is None:
         cells = np.ceil((plan.upper - plan.lower) / cell_size).prod()
         spacing = cell_size * int(np.ceil(np.sqrt(max(1.0, cells / MAX_GRID_VERTICES))))
-        return graded_grid(np.zeros((0, 2), dtype=np.intp), 0, *corners(spacing), 0), spacing
+        return (yield from graded_grid.slices(np.zeros((0, 2), dtype=np.intp), 0, *corners(spacing), 0)), spacing
     if close_up is not None and close_up.near.any():
         spacing = close_up.spacing
         fine, level = plan.fine_blocks(spacing, reach, close_up.near)
@@ -244,7 +229,7 @@ def _graded(plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp 
             further, its_level = plan.fine_blocks(spacing * 2**coarser, reach)
             coarsest = max(level, its_level + coarser, int(np.floor(np.log2(max(COARSEST / spacing, 1.0)))))
             far = Blocks(further, its_level + coarser, coarser)
-            return graded_grid(fine, level, *corners(spacing), coarsest, far), spacing
+            return (yield from graded_grid.slices(fine, level, *corners(spacing), coarsest, far)), spacing
     spacing = cell_size
     fine, level = plan.fine_blocks(spacing, reach)
     while len(fine) * 4**level > MAX_GRID_VERTICES:
@@ -254,4 +239,4 @@ def _graded(plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp 
     coarsest = max(level, int(np.floor(np.log2(max(COARSEST / spacing, 1.0)))))
     while np.prod((upper - lower) / 2.0**coarsest) > MAX_GRID_VERTICES:
         coarsest += 1
-    return graded_grid(fine, level, lower, upper, coarsest), spacing
+    return (yield from graded_grid.slices(fine, level, lower, upper, coarsest)), spacing

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import InputError
-from . import ground_mesh, own_data, playback, still_ground, trail_detail
+from ..playback import own_data, playback
+from . import ground_mesh, still_ground, trail_detail
 
 
 def check_writable(ground: bpy.types.Object) -> None:

@@ -26,13 +26,14 @@ from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
-from . import display_key, own_data, painted_ground, playback, weather_modifier
-from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
+from ..playback import display_key, own_data, playback, weather_modifier
+from ..playback.own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
+from . import painted_ground
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-SHOWN = ("steps", "max_depth_m", "peak_force_n")
+SHOWN = ("steps", "max_depth_m", "typical_depth_m", "peak_force_n")
 """Numbers that every summary has."""
 
 _BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
@@ -262,8 +263,11 @@ def undisturbed_copy(
             rest[moved] += np.asarray(by, dtype=np.float32)
         display_key.drop_all(mesh)
         write_positions(mesh, rest)
-        with stand_in(ground, mesh) as evaluated:
-            yield mesh_of(evaluated)
+        if any(modifier.show_viewport for modifier in users_modifiers(ground)):
+            with stand_in(ground, mesh) as evaluated:
+                yield mesh_of(evaluated)
+        else:
+            yield mesh
     finally:
         bpy.data.meshes.remove(mesh)
 

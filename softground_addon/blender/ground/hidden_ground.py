@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import bpy
 
-from ..animation_layer.nla_layer import animated_paths
+from ..animation_layer.animated_paths import animated_paths
 from . import ground_mesh
 
 WAS_HIDDEN = "softground_was_hidden"
@@ -49,9 +49,7 @@ def show_again(ground: bpy.types.Object) -> None:
     if not hides(ground):
         return
     kept: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
-    if len(kept) not in (2, len(_SHOWN)):  # two in files of before scatter stayed
-        kept = []
-    for name, value in zip(_SHOWN, (*kept, *_BY_DEFAULT[len(kept) :]), strict=True):
+    for name, value in zip(_SHOWN, kept if len(kept) == len(_SHOWN) else _BY_DEFAULT, strict=True):
         setattr(ground, name, bool(value))
     del ground[WAS_HIDDEN]
 

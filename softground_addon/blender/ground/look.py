@@ -10,9 +10,9 @@ from typing import Any
 
 import bpy
 
-from ...core.ground.presets import SURFACES
+from ...core.ground.surfaces import SURFACES
+from ..materials.materials import MARK, OVER, ensure_material, ensure_over
 from .baked_ground import display_mesh_of
-from .materials import MARK, OVER, ensure_material, ensure_over
 
 
 def follow(scene: bpy.types.Scene) -> None:

@@ -11,7 +11,8 @@ from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from .. import mesh_arrays
-from . import ground_mesh, playback
+from ..playback import playback
+from . import ground_mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

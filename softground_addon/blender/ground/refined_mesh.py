@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.meshing.refinement import Refinement, Surface
 from .. import mesh_arrays
-from . import own_data
+from ..playback import own_data
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -79,10 +79,7 @@ def build(
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     _add_loose_edges(mesh, source)
-    mesh.loops.add(len(corner_vertex))
-    mesh.loops.foreach_set("vertex_index", corner_vertex)
-    mesh.polygons.add(len(face_start))
-    mesh.polygons.foreach_set("loop_start", face_start.astype(np.int32))
+    mesh_arrays.add_faces(mesh, corner_vertex, face_start)
     del corner_vertex, face_start
     position: Any = mesh.attributes["position"]
     position.data.foreach_set("vector", refinement.at_vertices(surface, mesh_arrays.positions(source)).ravel())
@@ -127,7 +124,7 @@ def _copy_vertex_groups(
         inside = np.flatnonzero(everywhere)
         order = inside[np.argsort(everywhere[inside], kind="stable")]
         levels, first = np.unique(everywhere[order], return_index=True)
-        for level, alike in zip(levels.tolist(), np.split(order, first[1:]), strict=True):
+        for level, alike in zip(levels.tolist(), np.split(order, first)[1:], strict=True):
             group.add(alike.tolist(), level, "REPLACE")
     bpy.data.objects.remove(holder)
 
@@ -139,7 +136,8 @@ def _comes_along(name: str) -> bool:
 def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     """Edges without a face, which no face would bring back."""
     used = np.zeros(len(source.edges), dtype=bool)
-    used[_bulk(source.loops, "edge_index")] = True
+    if len(source.loops):
+        used[_values(source.attributes[".corner_edge"])] = True  # a hundred times faster than `loops`
     loose = np.flatnonzero(~used)
     if len(loose):
         mesh.edges.add(len(loose))

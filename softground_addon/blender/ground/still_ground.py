@@ -6,8 +6,9 @@ from typing import Any
 
 import bpy
 
-from ..animation_layer.nla_layer import animated_paths
+from ..animation_layer.animated_paths import animated_paths
 from ..compat import node_inputs
+from ..node_modifiers import named_by_nodes, nodes_of
 from . import ground_mesh
 
 TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
@@ -45,27 +46,24 @@ def changes_with_time(ground: bpy.types.Object) -> str:
     return next((item.name for item in theirs if _changes(item, ground, keyed)), "")
 
 
+def changes_shape(obj: bpy.types.Object) -> str:
+    """What gives an object another shape at each frame: its shape keys or a modifier; or an empty text."""
+    keys = getattr(obj.data, "shape_keys", None)
+    moving = keys and keys.animation_data
+    if moving and (moving.action or moving.drivers or any(track.strips for track in moving.nla_tracks)):
+        return "its shape keys"
+    modifier = changes_with_time(obj)
+    return modifier and f"its modifier '{modifier}'"
+
+
 def _changes(modifier: Any, ground: bpy.types.Object, keyed: tuple[str, ...]) -> bool:
     path = modifier.path_from_id()
     if modifier.type in TIME_DEPENDENT or any(one.startswith(path) for one in keyed):
         return True
-    inputs = [value for _, value in node_inputs(modifier)] if modifier.type == "NODES" else []
-    tree = modifier.node_group if modifier.type == "NODES" else None
-    nodes = list(_nodes_of(tree, set())) if tree else []
-    if any(node.bl_idname in TIME_NODES for node in nodes):
+    if any(node.bl_idname in TIME_NODES for node in nodes_of(modifier)):
         return True
-    settings = (one.identifier for one in modifier.bl_rna.properties if one.type == "POINTER")
-    inputs += [getattr(modifier, name) for name in settings]
-    inputs += [socket.default_value for node in nodes for socket in node.inputs if socket.type == "OBJECT"]
+    settings = [getattr(modifier, one.identifier) for one in modifier.bl_rna.properties if one.type == "POINTER"]
+    inputs = [value for _, value in node_inputs(modifier)] if modifier.type == "NODES" else []
+    inputs += [*settings, *named_by_nodes(modifier)]
     followed = [one for one in inputs if isinstance(one, bpy.types.Object) and one != ground]
     return any(mover_of(one) for one in followed)
-
-
-def _nodes_of(tree: Any, known: set[Any]) -> Any:
-    """The nodes of a group and of all groups within."""
-    known.add(tree)
-    for node in tree.nodes:
-        yield node
-        inner = getattr(node, "node_tree", None)
-        if inner is not None and inner not in known:
-            yield from _nodes_of(inner, known)

@@ -17,16 +17,16 @@ from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
 from ...core.numerics.cell_keys import Keys, keys_of
+from ..drafts import none_left_if_it_fails
+from ..playback import playback
 from ..settings import exists, find, name_of
-from . import ground_mesh, playback, refined_mesh
+from . import ground_mesh, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
 
 DETAIL = "softground_detail"
 """Property of the ground while it is hidden: the copy."""
 DETAIL_OF = "softground_detail_of"
 """Property of the copy: the ground that it stands in for."""
-NAMED = "softground_named"
-"""Property of copies that version 0.1 made, whose grounds do not say which one it is: the name that it was given."""
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
@@ -34,20 +34,14 @@ FLOOR = 1e-4
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     """The copy that takes the prints in place of a ground, which is hidden meanwhile; no duplicate of it."""
-    if not hides(ground):
-        return None  # a copy of the copy may still be there, as the user's own
-    if DETAIL not in ground.keys():  # noqa: SIM118  (an ID is no mapping)
-        return _detail_of_old(ground)
-    detail = ground[DETAIL]
+    detail = ground.get(DETAIL) if hides(ground) else None
     stands_in = exists(detail) and detail.get(DETAIL_OF) == ground  # not for a ground that is a duplicate
     return detail if stands_in else None
 
 
-def _detail_of_old(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The copy of a ground in a file of version 0.1."""
-    candidates = [obj for obj in bpy.data.objects if obj.get(DETAIL_OF) == ground and obj.library == ground.library]
-    # If the user has renamed it, it is the one that was there first in this session.
-    return min(candidates, key=lambda obj: (obj.get(NAMED) != obj.name, obj.session_uid), default=None)
+def was_deleted(ground: bpy.types.Object) -> bool:
+    """True if the copy that takes the prints of a ground was deleted in the viewport."""
+    return hides(ground) and not exists(ground.get(DETAIL))
 
 
 def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
@@ -78,19 +72,20 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
             f"Ground '{ground.name}' is hidden and shown by keys or drivers, and would show up beside the finer "
             "copy that takes the prints: remove them, or Subdivide the ground so that it needs no copy."
         )
-    with ground_mesh.undisturbed_copy(ground) as source:
-        groups = [group.name for group in ground.vertex_groups]
-        mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
-    del surface, refinement  # they may be large, and the draft is there for long
-    detail = ground.copy()
-    detail.name = f"{ground.name} Trail"
-    for modifier in [one for one in detail.modifiers if one.type != "COLLISION"]:  # what others collide with stays
-        detail.modifiers.remove(modifier)
-    detail.data = mesh
-    show_again(detail)
-    for name in (DETAIL, DETAIL_OF, NAMED):
-        detail.pop(name, None)  # of a hidden ground, or of one that is a duplicate of such a copy
-    drafted = name_of(detail)
+    with none_left_if_it_fails():
+        with ground_mesh.undisturbed_copy(ground) as source:
+            groups = [group.name for group in ground.vertex_groups]
+            mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
+        del surface, refinement  # they may be large, and the draft is there for long
+        detail = ground.copy()
+        detail.name = f"{ground.name} Trail"
+        for modifier in [one for one in detail.modifiers if one.type != "COLLISION"]:  # what others collide with stays
+            detail.modifiers.remove(modifier)
+        detail.data = mesh
+        show_again(detail)
+        for name in (DETAIL, DETAIL_OF):
+            detail.pop(name, None)  # of a hidden ground, or of one that is a duplicate of such a copy
+        drafted = name_of(detail)
     try:
         yield detail
     finally:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from ...core.capture.captured import Plate
 from ...core.capture.skeleton import Skeleton
-from ...core.numerics.orientation import quaternions
-from ..animation_layer.layer_curves import LayerCurve, new_action
-from ..compat import set_slot
+from ...core.numerics.orientation import quaternions, without_leaps
+from ..animation_layer.layer_curves import LayerCurve, assign_action, new_action
 
 Array = NDArray[np.float64]
 
@@ -51,25 +50,13 @@ def _animate(armature: bpy.types.Object, skeleton: Skeleton, frames: Array, unit
     channels, curves = skeleton.channels(), []
     for index, bone in enumerate(skeleton.bones):
         path = armature.pose.bones[bone.name].path_from_id()
-        turns = _without_leaps(quaternions(channels[:, index, :3, :3]))
+        turns = without_leaps(quaternions(channels[:, index, :3, :3]))
         places = channels[:, index, :3, 3] / unit
         for what, values in (("location", places), ("rotation_quaternion", turns)):
             curves += [
                 LayerCurve(f"{path}.{what}", axis, bone.name, frames, column) for axis, column in enumerate(values.T)
             ]
-    _assign(armature, new_action(armature.name, armature, curves))
-
-
-def _without_leaps(quaternion: Array) -> Array:
-    """The same turns (F, 4) with signs that change nowhere from one frame to the next."""
-    same = (quaternion[1:] * quaternion[:-1]).sum(axis=1) >= 0
-    return quaternion * np.cumprod(np.append(1.0, np.where(same, 1.0, -1.0)))[:, None]
-
-
-def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
-    obj.animation_data_create()
-    obj.animation_data.action = action
-    set_slot(obj.animation_data, next(iter(getattr(action, "slots", [])), None))
+    assign_action(armature, new_action(armature.name, armature, curves))
 
 
 def new_plate(context: bpy.types.Context, name: str, plate: Plate, frames: Array, unit: float) -> bpy.types.Object:
@@ -93,5 +80,5 @@ def new_plate(context: bpy.types.Context, name: str, plate: Plate, frames: Array
     for axis, values in zip("xyz", plate.force.T, strict=True):
         obj[f"force_{axis}"] = 0.0
         curves.append(LayerCurve(f'["force_{axis}"]', 0, "Force", frames, values))
-    _assign(obj, new_action(name, obj, curves))
+    assign_action(obj, new_action(name, obj, curves))
     return obj

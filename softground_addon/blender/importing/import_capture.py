@@ -20,7 +20,7 @@ from ..operator_base import reports_errors
 from ..settings import frame_rate_of, scene_of, units_of
 from .captured_rig import new_plate, new_rig
 
-LARGEST = 2**31
+LARGEST = 2**29
 """Size of a file that is read [bytes]."""
 
 MARKERS: dict[str, Callable[[bytes], Capture]] = {".c3d": c3d.read, ".trc": trc.read}

@@ -1,1 +1,1 @@
-"""The ground that gives way while the timeline plays."""
+"""Live mode: the ground gives way while the timeline plays."""

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ...core.composers.playhead import Playhead
 from ...core.ground.display_blur import blurred_window, gaussian_kernel
-from ...core.ground.heightfield import TILE, HeightField, Window
+from ...core.ground.heightfield import HeightField
+from ...core.ground.sparse_grid import TILE, Window
 from ...core.numerics import bilinear
 from ...core.record import record
 from ...core.record.footprints import NEVER
@@ -42,7 +43,7 @@ class _TileVertices:
     cell : (N, 2) int array
         Column and row of the cell that each of them lies in, in the tile.
     u, v : (N,) float arrays
-        How far they are from its centre to the next one's, 0 to 1.
+        Their fractions of the way from its centre to the next one's, 0 to 1.
     """
 
     index: Indices
@@ -112,14 +113,14 @@ class LiveGround:
         self._reached = np.empty(0, np.intp)
 
     def object(self, likely: bpy.types.Object | None) -> bpy.types.Object | None:
-        """The ground, which mostly is a likely one; None if it is gone or no longer what live mode made of it."""
+        """The ground, which mostly is a likely one; None if it is gone or no longer as live mode made it."""
         is_it = likely is not None and likely.session_uid == self._name.uid
-        found = likely if is_it else settings.find(self._name)
-        if found is None:
+        ground = likely if is_it else settings.find(self._name)
+        if ground is None:
             return None
-        mesh = ground_mesh.mesh_of(found)
-        intact = ground_mesh.is_baked(found) and len(mesh.vertices) == len(self._rest)
-        return found if intact else None
+        mesh = ground_mesh.mesh_of(ground)
+        intact = ground_mesh.is_baked(ground) and len(mesh.vertices) == len(self._rest)
+        return ground if intact else None
 
     def show(
         self, ground: bpy.types.Object, playhead: Playhead, windows: Sequence[Window], sigma: float, frame_rate: float

@@ -1,7 +1,7 @@
 """A ground that follows the timeline and the settings of its scene.
 
-Nobody tells of settings that change: they are compared. For others the shot is pressed again, a little at a time and
-the newest steps first.
+Blender does not report changes of settings: they are compared. After a change the shot is pressed again, a little at a
+time and the newest steps first.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.thrown_debris import thrown
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.errors import InputError
-from ...core.ground.heightfield import Window
+from ...core.ground.sparse_grid import Window
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
@@ -30,12 +29,11 @@ from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
-from ..after import debris_object
 from ..baking import bake_report
 from ..baking.bake_checks import coverage, wants_detail
-from ..baking.publish import at_the_end, publish, sign
+from ..baking.publish import at_the_end, publish, sign, with_debris
 from ..ground import baked_ground, ground_mesh, trail_detail
-from ..ground.created_ground import create_ground, reach_of
+from ..ground.created_ground import create_ground, laid_out, reach_of
 from ..ground.modified_prints import are_undone
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of, settings_of
@@ -62,11 +60,12 @@ class LiveMode:
     def __init__(self, scene: bpy.types.Scene) -> None:
         wanted = settings_of(scene)
         known = analysis.read(scene)
-        check_cell_size(known.loads, wanted.cell_size_m, wanted.longest_bake_s)
+        check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
         if wanted.ground is None:
             assert known.shot.plan is not None
+            layout = jobs.run(jobs.meanwhile(jobs.Progress("write", 0.0), laid_out(wanted, known.shot.plan)))
             with analysis.own_changes(scene):
-                ground = create_ground(scene, wanted, known.shot.plan)
+                ground = create_ground(scene, wanted, layout)
             wanted = replace(wanted, ground=settings.name_of(ground))
             known = analysis.read(scene)
         assert wanted.ground is not None
@@ -89,7 +88,7 @@ class LiveMode:
         if ground is None:
             return False
         if bpy.app.background:  # where there are no timers, and nobody waits
-            with suppress(InputError):  # what was read last is shown on
+            with suppress(InputError):  # the last reading stays shown
                 self.answer(scene)
         before = self._playhead.frame
         windows = self._playhead.go_to(float(scene.frame_current))
@@ -98,7 +97,7 @@ class LiveMode:
         return True
 
     def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
-        """Show what has changed, in some windows and where something else was shown in the meantime."""
+        """Show changes in some windows, and wherever something else was shown in the meantime."""
         wanted, windows = self._wanted, [*windows, *self._drawn_over]
         self._ground.show(ground, self._playhead, windows, wanted.material.blur_sigma, wanted.frame_rate)
         self._drawn_over = []
@@ -119,9 +118,9 @@ class LiveMode:
         return True
 
     def answer(self, scene: bpy.types.Scene, seconds: float = np.inf) -> bool:
-        """Press again what the settings and the animation of the moment ask for, for a while; whether there is more.
+        """Press again with the present settings and animation, for a while; True if there is more.
 
-        Who drags a slider sees the newest steps follow: only what comes after these is begun anew with each setting.
+        The newest steps follow a slider that is dragged: only the work after these begins anew with each setting.
 
         Parameters
         ----------
@@ -156,11 +155,11 @@ class LiveMode:
         return False
 
     def has_more(self, scene: bpy.types.Scene) -> bool:
-        """Whether what is shown is not yet what the settings of the moment ask for."""
+        """True if the ground does not show the present settings yet."""
         return self._answering is not None or self._is_another(scene, settings.snapshot(scene))
 
     def _is_another(self, scene: bpy.types.Scene, asked: BakeSettings) -> bool:
-        """Whether settings or animation are others than those that are being pressed, or were last."""
+        """True if settings or animation differ from those that are being pressed, or were last."""
         if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
             return False  # another ground wants another live mode
         if self.refusal(asked):
@@ -172,23 +171,23 @@ class LiveMode:
 
     @property
     def has_refused(self) -> bool:
-        """Whether there were settings that it did not press with."""
+        """True if there were settings that it did not press with."""
         return self._refused is not None
 
     def refusal(self, asked: BakeSettings) -> str:
-        """Why some settings are not pressed; empty where they are, or were not tried."""
+        """Reason why settings are not pressed; empty if they are, or were not tried."""
         return self._refused[1] if self._refused is not None and self._refused[0] == asked else ""
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
-        """Press the shot up to the frame that is shown: the newest steps onto what lies there, then all of them."""
+        """Press the shot up to the frame that is shown: the newest steps onto the present ground, then all of them."""
         scene = self.current_scene()
         assert scene is not None
         known = yield from _in_steps(analysis.refreshing(scene))
         if known is None:
             raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
-            check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
-        except InputError as error:  # what was pressed before is shown on
+            check_cell_size(known.loads, asked.fineness, asked.longest_bake_s)
+        except InputError as error:  # the last ground stays shown
             self._refused = asked, str(error)
             return
         whole = self._playhead
@@ -230,7 +229,7 @@ class LiveMode:
             yield
 
     def _presses_like(self, known: analysis.Analysis, asked: BakeSettings) -> bool:
-        """Whether the ground that is shown need not be pressed again."""
+        """True if the ground that is shown need not be pressed again."""
         same_loads = known.loads is self._analysis.loads and known.shot is self._analysis.shot
         looks = replace(self._wanted.material, blur_sigma=asked.material.blur_sigma)
         return same_loads and _pressed_by(replace(self._wanted, material=looks)) == _pressed_by(asked)
@@ -248,11 +247,11 @@ class LiveMode:
         return self._playhead.in_contact(), self._playhead.ground.cell_size, self._wanted.material.rim_reach
 
     def keep(self, scene: bpy.types.Scene) -> None:
-        """Leave the ground as it is shown, as the bake of the frames up to now with what they were pressed with."""
+        """Keep the ground as shown: as the bake of the frames up to now, with the settings that pressed them."""
         ground = self._object(scene)
         if ground is None:
             return
-        with suppress(InputError):  # then what was pressed before is kept
+        with suppress(InputError):  # then the last ground is kept
             self.answer(scene)
         now = settings.snapshot(scene)
         made_with = replace(
@@ -270,27 +269,12 @@ class LiveMode:
         vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
         shown = PressedGround.at(footprints, **at_the_end(made_with))
         place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
-        left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
-        debris = None
-        if made_with.debris:
-            left, debris = thrown(
-                left,
-                self._playhead.loads_by_now(),
-                ground_of(made_with, self._analysis.shot),
-                surface=made_with.surface,
-                cell_size=made_with.cell_size_m,
-                gravity=made_with.gravity_m_s2,
-            )
-        published = jobs.run(publish(left, place, made_with))
-        owner = settings.found(self._owner)
-        debris_object.put(owner, debris, surface=made_with.surface, units=made_with)
-        sign(
-            published.display_mesh,
-            owner,
-            made_with.inputs(Acts.WRITING),
-            staleness.of_movers(scene, made_with),
-            summary=bake_report.summary_of_prints(left.footprints),
-        )
+        baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
+        pressed_on = ground_of(made_with, self._analysis.shot)
+        baked, debris = with_debris(baked, pressed_on, made_with, self._playhead.loads_by_now())
+        published = jobs.run(publish(baked, debris, place, made_with))
+        movers = staleness.of_movers(scene, made_with)
+        sign(published, made_with, movers, summary=bake_report.summary_of_prints(baked.footprints))
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
@@ -300,7 +284,7 @@ class LiveMode:
 
 
 def _display_mesh(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
-    """What takes the prints: the ground, or a copy that is fine where its characters will step.
+    """The ground that takes the prints, or a copy of it that is fine where its characters will step.
 
     Raises
     ------
@@ -332,7 +316,7 @@ _ENDED = object()
 
 
 def _in_steps(job: jobs.Job[jobs.Result]) -> Generator[None, None, jobs.Result]:
-    """A job whose progress nobody asks for."""
+    """A job without its progress."""
     while True:
         try:
             next(job)

@@ -1,1 +1,1 @@
-"""What takes a bake out of Blender, or makes curves of it."""
+"""Export of a bake to other programs, or to curves."""

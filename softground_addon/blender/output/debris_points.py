@@ -8,30 +8,29 @@ from typing import Any
 
 import bpy
 
-from ..after import debris_nodes as nodes
-from ..after import debris_object
-from ..node_graph import NodeGraph, new_group
-
-CLOUDS_SINCE = (4, 3)
-"""Blender that writes point clouds to USD; an earlier one gets the vertices of a mesh."""
+from .. import compat
+from ..debris import debris_nodes as nodes
+from ..debris import debris_object
+from ..node_graph import NodeGraph
+from ..node_modifiers import new_group
 
 
 @contextmanager
 def selected(scene: bpy.types.Scene, ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
-    """What a ground's bake throws as an object of points that is selected, and gone afterwards; none without debris.
+    """Debris of a ground's bake as a selected object of points, which is removed afterwards; none without debris.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     ground : bpy.types.Object
     clouds : bool
-        Whether the format takes point clouds, which have a `radius`. Else they are the vertices of a mesh.
+        True if the format takes point clouds, which have a `radius`. Else they are the vertices of a mesh.
     """
     debris = debris_object.of(ground)
     if debris is None:
         yield
         return
-    clouds = clouds and bpy.app.version >= CLOUDS_SINCE
+    clouds = clouds and compat.WRITES_CLOUDS
     points: Any = (bpy.data.pointclouds if clouds else bpy.data.meshes).new(f"{ground.name} Debris")
     obj, group = bpy.data.objects.new(points.name, points), _group(debris, clouds)
     try:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import bpy
 
-from ...core.after import event_edl, event_json, event_midi, event_otio, event_reaper
-from ...core.after.events import Event, between
+from ...core.events import event_edl, event_json, event_midi, event_otio, event_reaper
+from ...core.events.events import Event, between
 from ...core.files import files
 from .. import settings
 from ..ground import baked_ground
 
 Dump = Callable[[Sequence[Event], float], str | bytes]
-"""From events and frame rate [Hz]."""
+"""Content of a file from events and frame rate [Hz]."""
 
 KINDS: dict[str, tuple[str, str, str, Dump]] = {
     "EVENTS_JSON": (
@@ -48,7 +48,7 @@ KINDS: dict[str, tuple[str, str, str, Dump]] = {
         lambda table, rate: event_otio.dump(table, frame_rate=rate),
     ),
 }
-"""Formats: suffix, label and description for the user, and what writes one."""
+"""Formats: suffix, label and description for the user, and the writer."""
 
 
 def write(scene: bpy.types.Scene, ground: bpy.types.Object, kind: str, path: Path, start: int, end: int) -> None:

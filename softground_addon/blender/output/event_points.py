@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...core.after.events import Event, label
-from ...core.after.phases import KINDS
+from ...core.events.events import Event, label
+from ...core.events.phases import KINDS
 from .. import settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
@@ -30,7 +30,7 @@ MARKED = {"heel_strike", "land", "toe_off"}
 def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Object:
     """An object whose points are the events, in place of the one that there may be.
 
-    Texts become numbers: `phase` in the order of `core.after.phases.KINDS`, `character` and `contact` in the order
+    Texts become numbers: `phase` in the order of `core.events.phases.KINDS`, `character` and `contact` in the order
     of the lists that the object has as custom properties.
     """
     points = bpy.data.meshes.new(NAME)
@@ -51,12 +51,12 @@ def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Obje
 
 
 def add_markers(scene: bpy.types.Scene, table: Sequence[Event], kinds: set[str]) -> int:
-    """Put the events of some phases into the timeline, in place of those of an earlier bake; returns how many."""
+    """Put the events of some phases into the timeline, in place of those of an earlier bake; returns their number."""
     ours = {f"{row['character']} {row['contact']} " for row in table}
     endings = tuple(kind.replace("_", " ") for kind in KINDS)
     markers: Any = scene.timeline_markers
     for marker in list(markers):
-        if marker.name.endswith(endings) and any(marker.name.startswith(one) for one in ours):
+        if marker.name.endswith(endings) and any(marker.name.startswith(prefix) for prefix in ours):
             markers.remove(marker)
     wanted = [row for row in table if row["phase"] in kinds]
     for row in wanted:
@@ -65,7 +65,7 @@ def add_markers(scene: bpy.types.Scene, table: Sequence[Event], kinds: set[str])
 
 
 def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
-    """The scene's object of events with other points; what the user did to it stays."""
+    """The scene's object of events with new points; the user's changes of it stay."""
     shown = scene.objects.get(NAME)
     if shown is None or shown.type != "MESH":
         shown = bpy.data.objects.new(NAME, points)
@@ -84,7 +84,7 @@ def _store(points: bpy.types.Mesh, name: str, kind: Any, field: str, values: Any
 
 
 def _events(context: bpy.types.Context) -> list[Event]:
-    return baked_ground.events_of(settings.scene_of(context).softground.ground)
+    return baked_ground.events_of(settings.options_of(context).ground)
 
 
 class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):

@@ -1,4 +1,4 @@
-"""The bake as files: which formats there are, what is checked before one is written, and the buttons for it."""
+"""The bake as files: the formats, the checks before one is written, and the buttons for it."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ LARGEST_IMAGE = 16384
 
 @dataclass(frozen=True)
 class Options:
-    """How a bake is written.
+    """Options of an export.
 
     Attributes
     ----------
     format : str
         Key of one of `FORMATS`.
     path : Path
-        The file; of image sequences its folder and what their names begin with.
+        The file; of image sequences the folder and the beginning of their names.
     start, end : int
         First and last frame.
     resolution : int
         Width and height of images [pixels].
     uv_map : str
-        Of images; by default the one that is rendered.
+        UV map of images; by default the one that is rendered.
     outdated : bool
-        Whether a bake is written that no longer fits what it was made from.
+        True to write a bake that no longer fits its inputs.
     samples : Path, optional
         Folder of recordings, of sounds.
     stereo : bool
-        Of sounds: whether they come from where the camera sees the steps.
+        True if sounds come from where the camera sees the steps.
     """
 
     format: str
@@ -115,18 +115,30 @@ class Format:
     label, description : str
         For the user.
     write : callable
-        Writes a scene's baked ground as `Options` say; returns the files.
+        Writes a scene's baked ground with `Options`; returns the files.
+    built : bool
+        False where the Blender that we run in was built without it, as those of some Linux distributions are.
     """
 
     suffix: str
     label: str
     description: str
     write: Writer
+    built: bool = True
 
+    @property
+    def missing(self) -> str:
+        """The reason for which it cannot be written; empty where it can."""
+        return "" if self.built else f"This Blender was built without {self.label}: choose another format"
+
+
+_BUILT = bpy.app.build_options
 
 FORMATS = {
-    "ALEMBIC": Format(".abc", "Alembic", "The moving ground", _moving(exports.export_alembic)),
-    "USD": Format(".usdc", "USD", "The moving ground with its shading attributes", _moving(exports.export_usd)),
+    "ALEMBIC": Format(".abc", "Alembic", "The moving ground", _moving(exports.export_alembic), _BUILT.alembic),
+    "USD": Format(
+        ".usdc", "USD", "The moving ground with its shading attributes", _moving(exports.export_usd), _BUILT.usd
+    ),
     "PC2": Format(
         ".pc2",
         "Point Cache (PC2)",
@@ -134,9 +146,15 @@ FORMATS = {
         _moving(exports.export_point_cache),
     ),
     "EXR": Format(
-        ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map", _images
+        ".exr",
+        "Images (EXR)",
+        "Displacement, and compression, rim and age as a mask, in the ground's UV map",
+        _images,
+        _BUILT.image_openexr,
     ),
-    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it is after the last step", _still),
+    "OBJ": Format(
+        ".obj", "Final Mesh (OBJ)", "The ground as it is after the last step", _still, _BUILT.io_wavefront_obj
+    ),
     **{
         kind: Format(suffix, label, description, _events)
         for kind, (suffix, label, description, _) in event_exports.KINDS.items()
@@ -156,8 +174,10 @@ def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     Raises
     ------
     InputError
-        If there is no bake, it is outdated, or the files cannot be written; says what to do.
+        If Blender lacks the format, there is no bake, it is outdated, or the files cannot be written; says what to do.
     """
+    if missing := FORMATS[options.format].missing:
+        raise InputError(f"{missing}.")
     ground = _ground(scene, outdated=options.outdated)
     if options.end < options.start:
         raise InputError(
@@ -169,18 +189,32 @@ def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"The folder '{path.parent}' cannot be written to: choose another.")
     is_open = scene == bpy.context.scene  # the one that Blender's exporters write
-    there = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
-    with there:
+    in_scene = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
+    with in_scene:
         return FORMATS[options.format].write(scene, ground, options)
 
 
 def with_suffix(path: Path, kind: str) -> Path:
     """The path with the suffix of a format in place of that of another one."""
-    known = {one.suffix for one in FORMATS.values()} | {".usd", ".usda"}
+    known = {each.suffix for each in FORMATS.values()} | {".usd", ".usda"}
     wanted = FORMATS[kind].suffix
     if kind == "USD" and path.suffix in (".usd", ".usda"):
         return path
     return path.with_suffix(wanted) if path.suffix in known else path.with_name(path.name + wanted)
+
+
+def check_suffix(path: Path, kind: str) -> Path:
+    """The path, with the suffix of a format if it has none.
+
+    Raises
+    ------
+    InputError
+        If it has another one: no file gets another name than the user gave.
+    """
+    named = with_suffix(path, kind)
+    if path.suffix and named != path:
+        raise InputError(f"'{path.name}' does not end in {named.suffix}: give --output a name that does.")
+    return named
 
 
 def default_path(scene: bpy.types.Scene, kind: str) -> Path:
@@ -214,12 +248,13 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
     filepath: StringProperty(name="File", description="File to write", subtype="FILE_PATH")
     check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser shows it in red
     filter_glob: StringProperty(
-        default=";".join(f"*{one.suffix}" for one in FORMATS.values()) + ";*.usd;*.usda", options={"HIDDEN"}
+        default=";".join(f"*{each.suffix}" for each in FORMATS.values()) + ";*.usd;*.usda", options={"HIDDEN"}
     )
     format: EnumProperty(
         name="Format",
         description="Kind of file",
-        items=[(kind, one.label, one.description) for kind, one in FORMATS.items()],
+        items=[(kind, each.label, each.missing or each.description) for kind, each in FORMATS.items()],
+        default=next(kind for kind, each in FORMATS.items() if each.built),
     )
     frame_start: IntProperty(name="First Frame", description="First frame to write", default=1)
     frame_end: IntProperty(name="Last Frame", description="Last frame to write", default=250)
@@ -251,7 +286,12 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         layout: Any = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(self, "format")
+        column = layout.column(align=True)
+        column.use_property_split = False
+        for kind, export_format in FORMATS.items():
+            row = column.row()
+            row.enabled = export_format.built
+            row.prop_enum(self, "format", kind)
         if self.format != "OBJ":
             column = layout.column(align=True)
             column.prop(self, "frame_start", text="Frame Start")
@@ -259,10 +299,10 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         if self.format == "EXR":
             column = layout.column()
             column.prop(self, "resolution")
-            column.prop_search(self, "uv_map", settings.scene_of(context).softground.ground.data, "uv_layers")
+            column.prop_search(self, "uv_map", settings.options_of(context).ground.data, "uv_layers")
             column = layout.column(align=True)
             column.active = False
-            for kind in image_exports.kinds_of(settings.scene_of(context).softground.ground):
+            for kind in image_exports.kinds_of(settings.options_of(context).ground):
                 column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
         layout.prop(self, "outdated")
 

@@ -18,12 +18,13 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
-from ..after import debris_object
-from ..ground import baked_ground, display_key, ground_mesh, own_data, playback, weather_modifier
+from ..debris import debris_object
+from ..ground import baked_ground, ground_mesh
+from ..playback import display_key, own_data, playback, weather_modifier
 from . import debris_points
 
 BYTES_OF_A_POINT = 24
-"""Of debris in a frame of Alembic: place and velocity."""
+"""Size of a piece of debris in a frame of Alembic: place and velocity."""
 
 
 def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
@@ -132,8 +133,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
 def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Object:
     """A new object with the ground as it stands at the end of the bake: a plain mesh, no modifiers or shape keys.
 
-    What the user's modifiers make of the ground is in the mesh, and what weather has made of it by the last frame of
-    the scene, or of the bake if that is later.
+    The mesh includes the user's modifiers, and the weather by the last frame of the scene, or of the bake if that is
+    later.
 
     Raises
     ------
@@ -163,7 +164,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
 
 
 def _last_frame(scene: bpy.types.Scene, ground: bpy.types.Object) -> int:
-    """Of the scene, or of the bake if that is later."""
+    """Last frame of the scene, or of the bake if that is later."""
     return math.ceil(max(scene.frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
 
 
@@ -242,7 +243,7 @@ def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:
 
 @contextmanager
 def written_by_blender(partial: Path, path: Path) -> Iterator[None]:
-    """Blender writes a file: say why it could not, also of a full disk, of which many of its writers tell nothing.
+    """Errors of Blender's writers as exceptions, also that of a full disk, which many of them do not report.
 
     Raises
     ------

@@ -27,7 +27,7 @@ from ..reading import analysis
 Array = NDArray[np.float64]
 
 FORCE, CONTACT = "force", "contact"
-"""What follows a sole's name in the names of the properties."""
+"""Endings of the properties' names, after a sole's name."""
 
 
 def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tuple[str, str], tuple[Array, Array]]:
@@ -56,30 +56,30 @@ ESTIMATED = (
     *("deviation_n", "force_x_n", "force_y_n", "force_z_n"),
     *("centre_x_m", "centre_y_m", "centre_z_m", "free_moment_nm"),
 )
-"""Columns of what the estimate tells beside the normal force: its standard deviation, the force of the ground in the
-world's axes, where it acts, and the moment about the upward axis there."""
+"""Columns of the estimate beside the normal force: its standard deviation, the force of the ground in the world's axes,
+its point of action, and the moment about the upward axis there."""
 
 Estimates = Mapping[tuple[str, str], Array]
 """Values of those columns at each frame by character and sole, (N, 8); NaN where there is none."""
 
 
 def estimates_of(loads: Sequence[CharacterLoads], frames: Array) -> Estimates:
-    """What the estimate tells at scene frames. Only a body with joints has a deviation and free moments."""
-    found: dict[tuple[str, str], Array] = {}
-    for one in loads:
-        touching, known = one.contacts.touching, one.motion.joints and one.motion.centre is None
+    """Estimated values at scene frames. Only a body with joints has a deviation and free moments."""
+    estimates: dict[tuple[str, str], Array] = {}
+    for character in loads:
+        touching, known = character.contacts.touching, character.motion.joints and character.motion.centre is None
         nothing = np.full(touching.shape, np.nan)
-        deviation, twist = (force_deviation(one), free_moments(one)) if known else (nothing, nothing)
-        centre = np.where(touching[..., None], one.forces.centre_of_pressure, np.nan)
-        columns = np.concatenate([deviation[..., None], one.forces.forces, centre, twist[..., None]], axis=-1)
-        for number, sole in enumerate(one.motion.soles):
-            values = [np.interp(frames, one.motion.frames, column) for column in columns[:, number].T]
-            found[one.motion.name, sole.sole.name] = np.stack(values, axis=1)
-    return found
+        deviation, twist = (force_deviation(character), free_moments(character)) if known else (nothing, nothing)
+        centre = np.where(touching[..., None], character.forces.centre_of_pressure, np.nan)
+        columns = np.concatenate([deviation[..., None], character.forces.forces, centre, twist[..., None]], axis=-1)
+        for number, sole in enumerate(character.motion.soles):
+            values = [np.interp(frames, character.motion.frames, column) for column in columns[:, number].T]
+            estimates[character.motion.name, sole.sole.name] = np.stack(values, axis=1)
+    return estimates
 
 
 def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float, estimates: Estimates | None = None) -> str:
-    """The forces as comma-separated values, one row per frame and sole; what is not known stays empty."""
+    """The forces as comma-separated values, one row per frame and sole; unknown values stay empty."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n", *ESTIMATED])
@@ -89,8 +89,8 @@ def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float, est
         for (character, sole), (force, contact) in curves.items():
             time = round((frame - frames[0]) / frame_rate, 6)
             newtons = round(float(force[place]), 3)
-            told = (estimates or {}).get((character, sole), unknown)[place].tolist()
-            cells = [round(value, 4) if np.isfinite(value) else "" for value in told]
+            estimated = (estimates or {}).get((character, sole), unknown)[place].tolist()
+            cells = [round(value, 4) if np.isfinite(value) else "" for value in estimated]
             rows.writerow([int(frame), time, character, sole, int(contact[place]), newtons, *cells])
     return text.getvalue()
 
@@ -121,7 +121,7 @@ def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames
 
 
 def _fresh_empty(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
-    """The empty of that name without any forces; how else the user has animated it stays."""
+    """The empty of that name without any forces; the user's other animation of it stays."""
     empty = scene.objects.get(name)
     if empty is None or empty.type != "EMPTY":
         empty = bpy.data.objects.new(name, None)
@@ -185,7 +185,7 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
         empties = write_curves(settings.scene_of(context), *_baked(context))
         for other in context.selected_objects:
             other.select_set(False)
-        for empty in empties:  # the Graph Editor shows the curves of what is selected
+        for empty in empties:  # the Graph Editor shows the curves of selected objects
             if empty.name in context.view_layer.objects:
                 empty.select_set(True)
                 if context.mode == "OBJECT":
@@ -217,7 +217,7 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         scene = settings.scene_of(context)
         try:
             estimates = estimates_of(analysis.read(scene).loads, frames)
-        except SoftGroundError as error:  # the record is there without those who left it
+        except SoftGroundError as error:  # the record exists without its characters
             self.report({"WARNING"}, f"Normal forces only, as the shot cannot be read: {error}")
             estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))

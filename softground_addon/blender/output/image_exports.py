@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.fallout import Fallout
 from ...core.composers.relief_plan import relief_at
+from ...core.debris.fallout import Fallout
 from ...core.errors import InputError
 from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
@@ -21,8 +21,9 @@ from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
 from .. import settings
-from ..after import debris_object
-from ..ground import baked_ground, ground_mesh, refined_mesh, weathered_points
+from ..debris import debris_object
+from ..ground import baked_ground, ground_mesh, refined_mesh
+from ..weather import weathered_points
 from .exports import baked_display_mesh, written_by_blender
 
 Array = NDArray[np.float64]
@@ -30,15 +31,15 @@ Indices = NDArray[np.intp]
 
 DISPLACEMENT, MASK, WEATHER, DEBRIS = "displacement", "mask", "weather", "debris"
 """Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,
-wetness and fresh snow, 0 to 1, and depth of standing water [m]; where steps threw, of what has come down: volume over
-area [m], share that it covers, 0 to 1, and time since [s], `NEVER` where nothing did."""
+wetness and fresh snow, 0 to 1, and depth of standing water [m]; with debris, its volume over area [m], the share that
+it covers, 0 to 1, and the time since it came down [s], `NEVER` where none did."""
 FINEST_FALLOUT = 0.01
 """Least side of the squares over which debris is summed [m]; in coarse images it is that of a pixel."""
 FARTHEST_FALLOUT = 3.0
-"""Debris that lies farther than this from all prints is left out [m]."""
+"""Largest distance of exported debris from all prints [m]."""
 
 STRAY = 0.02
-"""Pixels farther than this from any footprint's cells are left out of the look-up [m]."""
+"""Largest distance of a pixel from a footprint's cells in the look-up [m]."""
 
 PROBES = 64
 """Cells of a footprint that are looked up in the UV map before it is used, about."""
@@ -74,7 +75,7 @@ def export_images(
     uv_map : str
         Name of the UV map; by default the one that is rendered.
     name : str
-        What the files' names begin with; by default the ground's name.
+        Beginning of the files' names; by default the ground's name.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def export_images(
         reach = max(reach, _farthest(footprints, fallen.place))
     pixels = _pixels(scene, ground, footprints, reach, resolution, uv_map)
     # Last comes a place that no footprint reaches: as it is, so is all the ground around.
-    far = max(((one.window.column + one.window.columns) * one.cell_size for one in footprints), default=0.0)
+    far = max(((each.window.column + each.window.columns) * each.cell_size for each in footprints), default=0.0)
     position = np.append(pixels.position, [(far + 2 * reach, 0.0, 0.0)], axis=0)
     x, y, _ = position.T
     relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
@@ -140,7 +141,7 @@ def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:
 
 
 def _fallen(scene: bpy.types.Scene, ground: bpy.types.Object) -> debris_object.AtRest | None:
-    """What lies of what steps threw; None where they threw nothing."""
+    """Debris at rest; None if steps threw nothing."""
     obj = debris_object.of(ground)
     if obj is None:
         return None
@@ -151,7 +152,7 @@ def _fallen(scene: bpy.types.Scene, ground: bpy.types.Object) -> debris_object.A
 
 
 def _farthest(footprints: Sequence[Footprint], place: Array) -> float:
-    """How far from the box around all footprints something lies, `FARTHEST_FALLOUT` at most [m]."""
+    """Largest distance of debris from the box around all footprints, `FARTHEST_FALLOUT` at most [m]."""
     if not footprints or not len(place):
         return 0.0
     low, high = extent(footprints)
@@ -175,10 +176,10 @@ def _pixels(
     resolution: int,
     uv_map: str,
 ) -> Pixels:
-    """The pixels of the ground's UV map that lie near footprints, and where."""
+    """The pixels of the ground's UV map that lie near footprints, with their places."""
     with ground_mesh.undisturbed_copy(ground) as mesh:
         layers = mesh.uv_layers
-        layer = layers.get(uv_map) if uv_map else next((one for one in layers if one.active_render), None)
+        layer = layers.get(uv_map) if uv_map else next((each for each in layers if each.active_render), None)
         if layer is None:
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
@@ -198,7 +199,7 @@ def _pixels(
 
 
 def _leaves_image(footprints: Sequence[Footprint], uv: Array, place: Array, slack: float) -> bool:
-    """Whether some of what is stepped on lies in triangles (T, 3, 2) at a place in the UV map outside of the image."""
+    """True if footprints reach triangles (T, 3, 2) at a place in the UV map outside of the image."""
     pokes_out = ((uv < -slack) | (uv > 1 + slack)).any(axis=(1, 2))
     uv, place = uv[pokes_out], place[pokes_out]
     for footprint in footprints if len(uv) else ():
@@ -210,14 +211,14 @@ def _leaves_image(footprints: Sequence[Footprint], uv: Array, place: Array, slac
         triangle = np.repeat(np.flatnonzero(near), len(points))
         u, v, inside = barycentric(place[triangle], np.tile(points, (np.count_nonzero(near), 1)))
         weights = np.stack([1 - u - v, u, v], axis=-1)[inside]
-        there = np.einsum("nk,nki->ni", weights, uv[triangle[inside]])
-        if ((there < -slack) | (there > 1 + slack)).any():
+        at_uv = np.einsum("nk,nki->ni", weights, uv[triangle[inside]])
+        if ((at_uv < -slack) | (at_uv > 1 + slack)).any():
             return True
     return False
 
 
 def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array) -> NDArray[np.bool_]:
-    """Which triangles (T, 3, 2) come near the box around all footprints."""
+    """True for triangles (T, 3, 2) near the box around all footprints."""
     if not footprints:
         return np.zeros(len(place), dtype=bool)
     low, high = extent(footprints)

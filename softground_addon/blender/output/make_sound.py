@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...core.errors import InputError
+from ...core.files import files
 from .. import compat, settings
 from ..operator_base import OnBake, beside_file, reports_errors
 from . import sound_exports
@@ -19,8 +20,7 @@ FILE = "footsteps.wav"
 
 def put_strip(scene: bpy.types.Scene, path: Path, frame: int) -> Any:
     """A sound strip at a frame, on the channel of the one before, which it replaces, or else on the first free one."""
-    strips = compat.strips_of(scene)
-    older = next((strip for strip in strips if strip.type == "SOUND" and strip.name.startswith(STRIP)), None)
+    strips, older = compat.strips_of(scene), _strip(scene)
     channel, volume = (older.channel, older.volume) if older else (_free_channel(strips), 1.0)
     if older:
         sound = older.sound
@@ -30,6 +30,19 @@ def put_strip(scene: bpy.types.Scene, path: Path, frame: int) -> Any:
     strip = strips.new_sound(STRIP, str(path), channel, frame)
     strip.volume = volume
     return strip
+
+
+def _strip(scene: bpy.types.Scene) -> Any:
+    """The strip that was added before; None if there is none any more."""
+    strips = compat.strips_of(scene) if scene.sequence_editor else ()
+    return next((strip for strip in strips if strip.type == "SOUND" and strip.name.startswith(STRIP)), None)
+
+
+def _is_others(scene: bpy.types.Scene, path: Path) -> bool:
+    """True if there is a file that the strip which was added before does not play."""
+    strip = _strip(scene)
+    played = Path(bpy.path.abspath(strip.sound.filepath)) if strip is not None and strip.sound else None
+    return path.exists() and (played is None or files.identity(played) != files.identity(path))
 
 
 def _free_channel(strips: Any) -> int:
@@ -54,8 +67,21 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         description="Hear each step from where the camera sees it, quieter the farther away it is",
     )
 
+    replace: BoolProperty(
+        name="Replace File", description="Write over the sound that is beside the file already", options={"SKIP_SAVE"}
+    )
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
         return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "samples")
+        layout.prop(self, "stereo")
+        if _is_others(settings.scene_of(context), beside_file(FILE)):
+            layout.label(text=f"There is a {beside_file(FILE).name} already", icon="ERROR", translate=False)
+            layout.prop(self, "replace")
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -63,6 +89,8 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         if not bpy.data.filepath:
             raise InputError("The sound is written beside the .blend file: save the file first.")
         path, options = beside_file(FILE), scene.softground
+        if not self.replace and _is_others(scene, path):
+            raise InputError(f"There is a '{path.name}' already: tick Replace File, or move that file.")
         sound_exports.write(
             scene,
             options.ground,

@@ -36,13 +36,13 @@ def write(scene: bpy.types.Scene, path: Path, start: int, end: int) -> list[Path
     written: list[Path] = []
     taken: set[str] = set()
     for character in everybody:
-        own = path
+        target = path
         if len(everybody) > 1:
             stem = f"{path.stem}_{bpy.path.clean_name(character.motion.name)}"
             numbered = (f"{stem}_{number}" if number > 1 else stem for number in count(1))
-            own = path.with_stem(next(name for name in numbered if name.casefold() not in taken))
-            taken.add(own.stem.casefold())
-        written += _write_one(character, own, start, end)
+            target = path.with_stem(next(name for name in numbered if name.casefold() not in taken))
+            taken.add(target.stem.casefold())
+        written += _write_one(character, target, start, end)
     return written
 
 

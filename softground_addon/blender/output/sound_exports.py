@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.after import sound, wave_file
-from ...core.after.sound import SoundStep
 from ...core.errors import InputError
+from ...core.events import sound, wave_file
+from ...core.events.sound import SoundStep
 from ...core.files import files
 from ...core.record.footprints import Footprint
 from .. import settings
@@ -41,7 +41,7 @@ def write(
     samples : Path, optional
         Folder of recordings to play instead of computed sounds.
     stereo : bool
-        Whether each step comes from where the camera sees it.
+        True if each step comes from where the camera sees it.
 
     Raises
     ------
@@ -89,18 +89,19 @@ def _seen_by_camera(
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []
     try:
-        for one in steps:
-            footprint = footprints[one.name]
+        for step in steps:
+            footprint = footprints[step.name]
             scene.frame_set(int(footprint.start_frame))
             place = camera.matrix_world.inverted() @ Vector((footprint.position / unit).tolist())
             seen.append((place.x, max(place.length, 1e-6)))
     finally:
         scene.frame_set(frame, subframe=subframe)
     nearest = min((distance for _, distance in seen), default=1.0)
-    return [replace(one, gains=_gains(side / far, nearest / far)) for one, (side, far) in zip(steps, seen, strict=True)]
+    gains = (_gains(side / far, nearest / far) for side, far in seen)
+    return [replace(step, gains=gain) for step, gain in zip(steps, gains, strict=True)]
 
 
 def _gains(side: float, loud: float) -> tuple[float, float]:
-    """Of left and right, of equal power wherever the sound is between -1 and 1."""
+    """Gains of left and right, of equal power wherever the sound is between -1 and 1."""
     angle = (side + 1.0) * np.pi / 4
     return float(loud * np.cos(angle)), float(loud * np.sin(angle))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from .. import settings
-from ..animation_layer import nla_layer
+from ..animation_layer.constraint_layer import LayerKind, set_strength
 from .fields import is_mesh, share
 
 DEFAULT_MASS = 77.5
@@ -17,9 +19,16 @@ def _is_armature(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -
     return candidate.type == "ARMATURE"
 
 
-def _show_response(character: SoftGroundCharacter, _context: bpy.types.Context) -> None:
-    if character.armature:
-        nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
+def _strength(kind: LayerKind, name: str, description: str) -> Any:
+    """A slider that scales a layer of the character."""
+
+    def show(character: SoftGroundCharacter, _context: bpy.types.Context) -> None:
+        if character.armature:
+            set_strength(character.armature, kind, settings.typed(getattr(character, kind.strength)))
+
+    return FloatProperty(
+        name=name, description=description, default=1.0, min=0.0, max=2.0, subtype="FACTOR", update=show
+    )
 
 
 class SoftGroundJoint(bpy.types.PropertyGroup):
@@ -135,15 +144,16 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         ],
         default="WHOLE_BODY",
     )
-    response_strength: FloatProperty(
-        name="Response",
-        description="How much of the baked response shows: 0 is the original animation, 1 the "
-        "response as baked. Needs no new bake",
-        default=1.0,
-        min=0.0,
-        max=2.0,
-        subtype="FACTOR",
-        update=_show_response,
+    root_motion_strength: _strength(
+        LayerKind.ROOT_MOTION, "Root Motion", "How fast the character travels: 1 is the speed at which its feet rest"
+    )
+    clean_feet_strength: _strength(
+        LayerKind.CLEAN_FEET, "Clean Feet", "How much of the cleaning shows: 0 is the original animation"
+    )
+    response_strength: _strength(
+        LayerKind.RESPONSE,
+        "Response",
+        "How much of the baked response shows: 0 is the original animation, 1 the response as baked. Needs no new bake",
     )
     joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)

@@ -6,21 +6,28 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ...core.ground.material import MATERIAL_RANGES
-from ...core.ground.presets import SURFACES
+from ...core.ground import presets
+from ...core.ground.material import MATERIAL_RANGES, GroundMaterial
+from ...core.ground.surfaces import SURFACES
+from ..state import state
 from .fields import in_unit
 
+USUAL_PACKING = 0.6
+"""Densest packing that is set where there was none: that of settled snow."""
+DEFAULT: Any = presets.find(presets.DEFAULT)
+"""What the settings of a ground are in a new scene."""
 
-def _limits(field: str) -> dict[str, float]:
+
+def _of_field(field: str) -> dict[str, float]:
     low, high = MATERIAL_RANGES[field]
-    return {"min": low, "max": high}
+    return {"min": low, "max": high, "default": getattr(DEFAULT.material, field)}
 
 
 _STIFFNESS = (
-    "Stiffness of the loose layer: twice the value makes prints half as deep. An effective modulus "
-    "for compaction, far below the elastic modulus in textbooks"
+    "Stiffness of the loose layer: twice the value makes prints half as deep where Exponent is 1. An effective "
+    "modulus for compaction, far below the elastic modulus in textbooks"
 )
 _LAYER = "Thickness of the loose layer. No print can be deeper"
 _RIM_REACH = "How far around the foot the displaced ground rises"
@@ -29,128 +36,161 @@ _CRUST = (
     "Pressure that breaks the crust on untouched ground; less leaves no print. A person exerts about "
     "20 kPa standing, 40 walking. 0 is no crust"
 )
+_EDGE_WIDTH = (
+    "Width of a sole whose edges bear as much as its area: narrower ones sink less, as in snow and clay. 0 makes depth "
+    "depend on pressure alone"
+)
 _FIRM_BELOW = "Compressed further than this, the ground is ten times stiffer. 0 is loose all the way down"
 
 
-look_followers: list[Callable[[bpy.types.Scene], None]] = []
-"""What is told when the look of a scene's ground is another: by what knows the ground."""
-
-
 def _look_changed(material: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    for follow in look_followers:
-        follow(cast("bpy.types.Scene", material.id_data))
+    state.hooks["follow_look"](material.id_data)
+
+
+def _packs(material: Any) -> bool:
+    return bool(material.densest > 0)
+
+
+def _let_pack(material: Any, packs: bool) -> None:
+    material.densest = USUAL_PACKING if packs else 0.0
 
 
 class SoftGroundMaterial(bpy.types.PropertyGroup):
     """The ground's physics; see `core.ground.material.GroundMaterial`."""
 
-    preset: StringProperty(name="Preset", description="Last preset loaded", default="Snow")
+    preset: StringProperty(name="Preset", description="Last preset loaded", default=DEFAULT.name)
     surface: EnumProperty(
         name="Look",
         description="Render material of the ground. It replaces SoftGround's own material, never yours",
         update=_look_changed,
-        items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
-        default="snow",
+        items=[(surface.name, surface.label, "") for surface in SURFACES.values()],
+        default=DEFAULT.surface,
     )
     youngs_modulus: FloatProperty(
         name="Young's Modulus (Pa)",
         description=_STIFFNESS,
-        default=375e3,
         precision=0,
         step=1000000,
-        **_limits("youngs_modulus"),
+        **_of_field("youngs_modulus"),
     )
     poisson_ratio: FloatProperty(
         name="Rim Volume",
         description="How much of the displaced volume rises around the foot: none at 0, all of it at "
         "0.5 (sand). Poisson's ratio",
-        default=0.05,
         precision=3,
-        **_limits("poisson_ratio"),
+        **_of_field("poisson_ratio"),
     )
     characteristic_time: FloatProperty(
         name="Settling Time",
         description="How long the ground takes to give way under a steady load",
-        default=0.2,
         precision=3,
         unit="TIME_ABSOLUTE",
-        **_limits("characteristic_time"),
+        **_of_field("characteristic_time"),
     )
     layer_depth: FloatProperty(
         name="Layer Depth (m)",
         description=_LAYER,
-        default=0.3,
         precision=3,
         soft_max=2.0,
-        **_limits("layer_depth"),
+        **_of_field("layer_depth"),
     )
     rim_reach: FloatProperty(
         name="Rim Reach (m)",
         description=_RIM_REACH,
-        default=0.04,
         precision=3,
         soft_max=0.5,
-        **_limits("rim_reach"),
+        **_of_field("rim_reach"),
     )
     blur_sigma: FloatProperty(
         name="Smoothing (m)",
         description=_SMOOTHING,
-        default=0.005,
         precision=4,
         soft_max=0.05,
-        **_limits("blur_sigma"),
+        **_of_field("blur_sigma"),
     )
     rim_bias: FloatProperty(
         name="Forward Push",
         description="How much more of the rim rises ahead of a moving foot than behind it: at 0 the "
         "rim is even, at 1 nothing rises right behind",
-        default=0.0,
         subtype="FACTOR",
-        **_limits("rim_bias"),
+        **_of_field("rim_bias"),
     )
     repose_angle: FloatProperty(
         name="Angle of Repose",
         description="Steepest slope that loose ground can hold: steeper rims and walls slide down. 0 "
         "leaves them as pressed; dry sand holds 32°",
-        default=0.0,
         subtype="ANGLE",
-        **_limits("repose_angle"),
+        **_of_field("repose_angle"),
     )
     shortest_time: FloatProperty(
         name="Shortest Time",
         description="Lower limit of the settling time under a fast landing, where the ground gives "
         "way as fast as the foot stops. 0 always uses the full Settling Time",
-        default=0.0,
         precision=3,
         soft_max=0.2,
         unit="TIME_ABSOLUTE",
-        **_limits("shortest_time"),
+        **_of_field("shortest_time"),
     )
     hardening: FloatProperty(
         name="Hardening",
         description="How much stiffer trodden ground is under the next foot: at 10, a second "
         "identical step adds less than a third of the depth. 0 is off",
-        default=0.0,
         precision=1,
         soft_max=50.0,
-        **_limits("hardening"),
+        **_of_field("hardening"),
     )
     crust_stress: FloatProperty(
         name="Crust (Pa)",
         description=_CRUST,
-        default=0.0,
         precision=0,
         soft_max=100e3,
         step=100000,
-        **_limits("crust_stress"),
+        **_of_field("crust_stress"),
     )
     firm_depth: FloatProperty(
         name="Firm Below (m)",
         description=_FIRM_BELOW,
-        default=0.0,
         precision=3,
         soft_max=0.3,
-        **_limits("firm_depth"),
+        **_of_field("firm_depth"),
+    )
+    exponent: FloatProperty(
+        name="Exponent",
+        description="How stress grows with compression: 1 is a spring, as in the paper. In snow, at 2, twice the "
+        "weight sinks 1.4 times as deep; in clay, at 0.5, four times",
+        precision=2,
+        step=5,
+        **_of_field("exponent"),
+    )
+    densest: FloatProperty(
+        name="Densest Packing",
+        description="Part of the layer by which it can be pressed: what remains is packed as densely as it can be",
+        subtype="FACTOR",
+        **_of_field("densest"),
+    )
+    edge_width: FloatProperty(
+        name="Edges (m)", description=_EDGE_WIDTH, precision=3, soft_max=0.5, **_of_field("edge_width")
+    )
+    spread: FloatProperty(
+        name="Load Spread",
+        description="How far a load widens on its way down, sideways per depth: it evens out the floors of deep "
+        "prints. 0.5 is usual in snow; 0 is off",
+        precision=2,
+        **_of_field("spread"),
+    )
+    cohesionless: FloatProperty(
+        name="Cohesionless",
+        description="Part of the stiffness that comes from the ground's own weight, and so goes with the scene's "
+        "gravity: 1 for loose sand, 0 for what holds together",
+        subtype="FACTOR",
+        **_of_field("cohesionless"),
+    )
+    packs: BoolProperty(
+        name="Densest Packing",
+        description="Let the ground give way less and less as it is packed, rather than break off at the layer's depth",
+        get=_packs,
+        set=_let_pack,
+        options={"SKIP_SAVE"},
     )
 
     stiffness_mpa: in_unit(
@@ -160,7 +200,34 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     rim_reach_cm: in_unit("rim_reach", 0.01, "Rim Reach (cm)", _RIM_REACH, min=0.0, soft_max=20.0, precision=1)
     blur_sigma_cm: in_unit("blur_sigma", 0.01, "Smoothing (cm)", _SMOOTHING, min=0.0, soft_max=5.0, precision=2)
     crust_stress_kpa: in_unit("crust_stress", 1e3, "Crust (kPa)", _CRUST, min=0.0, soft_max=100.0, precision=1)
+    edge_width_cm: in_unit("edge_width", 0.01, "Edges (cm)", _EDGE_WIDTH, min=0.0, soft_max=50.0, precision=1)
     firm_depth_cm: in_unit("firm_depth", 0.01, "Firm Below (cm)", _FIRM_BELOW, min=0.0, soft_max=30.0, precision=1)
+
+
+def as_core(material: Any) -> GroundMaterial:
+    """The material as the core's type, in Blender's single precision."""
+    return GroundMaterial(**{field: float(getattr(material, field)) for field in MATERIAL_RANGES})
+
+
+def by_feel(
+    name: str,
+    description: str,
+    read: Callable[[GroundMaterial], float],
+    changed: Callable[[GroundMaterial, float], GroundMaterial],
+    **limits: Any,
+) -> Any:
+    """A property of the settings by which people know a ground: it is read from the material, and sets its fields."""
+
+    def shown(options: Any) -> float:
+        return read(as_core(options.material))
+
+    def set_to(options: Any, value: float) -> None:
+        before = as_core(options.material)
+        for field, number in vars(changed(before, value)).items():
+            if number != getattr(before, field):
+                setattr(options.material, field, number)
+
+    return FloatProperty(name=name, description=description, get=shown, set=set_to, options={"SKIP_SAVE"}, **limits)
 
 
 def _paintable(painted: SoftGroundPainted, _context: bpy.types.Context, _typed: str) -> list[str]:

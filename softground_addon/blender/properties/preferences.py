@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ...core.ground import presets
 from ..settings import ADD_ON, user_folder
@@ -28,9 +28,12 @@ class SoftGroundPreferences(bpy.types.AddonPreferences):
         search=_names,
     )
 
+    was_told: BoolProperty(name="Was Told", description="The user has been told where the panel is", options={"HIDDEN"})
+
     def draw(self, _context: bpy.types.Context) -> None:
         layout: Any = self.layout
         layout.use_property_split = True
+        layout.label(text="Press N in the 3D viewport, then choose the SoftGround tab", icon="INFO")
         layout.prop(self, "default_preset")
         doors = layout.row()
         doors.operator("softground.open_manual", text="Manual", icon="HELP")

@@ -43,7 +43,7 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
 
 
 class SoftGroundGrounding(bpy.types.PropertyGroup):
-    """How feet, legs and hips follow the pressed ground; see `core.response.grounding`."""
+    """How feet, legs and hips follow the pressed ground; see `core.legs.grounding`."""
 
     use: BoolProperty(
         name="Grounding",

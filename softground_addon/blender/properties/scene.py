@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -16,9 +15,11 @@ from bpy.props import (
     PointerProperty,
 )
 
+from ...core.ground import hand_hardness
+from ..state import state
 from .character import SoftGroundCharacter
 from .fields import in_unit, is_mesh
-from .material import SoftGroundMaterial, SoftGroundPainted
+from .material import DEFAULT, SoftGroundMaterial, SoftGroundPainted, by_feel
 from .response import SoftGroundGrounding, SoftGroundTilt
 
 DEFAULT_CELL_SIZE = 0.01
@@ -38,17 +39,18 @@ def _of_the_users_own(options: Any, _context: bpy.types.Context) -> None:
     options.cells_along_sole = 0.0
 
 
-depth_field: dict[str, Callable[..., Any]] = {}
-"""What `depth_cm` shows of a scene ("get"), and what typing it does ("set"): by what knows the prints to come."""
+def _worked_out(name: str) -> dict[str, Any]:
+    """Get and set a field that nothing stores, by the hooks `show_...` and `type_...` of its name."""
 
+    def shown(options: Any) -> float:
+        hook = state.hooks.get(f"show_{name}")
+        return float(hook(options.id_data)) if hook else 0.0
 
-def _shown_depth(options: Any) -> float:
-    return float(depth_field["get"](options.id_data)) if "get" in depth_field else 0.0
+    def set_to(options: Any, value: float) -> None:
+        if hook := state.hooks.get(f"type_{name}"):
+            hook(options.id_data, value)
 
-
-def _type_depth(options: Any, value: float) -> None:
-    if "set" in depth_field:
-        depth_field["set"](options.id_data, value)
+    return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
 
 
 class SoftGroundSettings(bpy.types.PropertyGroup):
@@ -71,9 +73,18 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         precision=4,
         update=_of_the_users_own,
     )
+    length_scale: FloatProperty(
+        name="Length Scale",
+        description="Lengths of the preset, as they are for the soles, over those for a person's",
+        default=1.0,
+        min=1e-4,
+        max=1.0,
+        options={"HIDDEN"},
+    )
     cells_along_sole: FloatProperty(
         name="Cells Along Sole",
         description="Cells along the shortest sole, which set the cell size; 0 if you set the size yourself",
+        default=DEFAULT.cells_along_sole,
         min=0.0,
         options={"HIDDEN"},
     )
@@ -132,12 +143,49 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         name="Depth (cm)",
         description="Depth of the typical step: half of the main steps are deeper, half shallower. "
         "Type another depth, and the stiffness of the ground follows",
-        get=_shown_depth,
-        set=_type_depth,
         min=0.0,
         soft_max=30.0,
         precision=1,
-        options={"SKIP_SAVE"},
+        **_worked_out("depth_cm"),
+    )
+    snow_cm: FloatProperty(
+        name="Final Snow (cm)",
+        description="Depth of the new snow on untouched ground at the scene's last frame. Sets Snowfall",
+        min=0.0,
+        soft_max=50.0,
+        precision=1,
+        **_worked_out("snow_cm"),
+    )
+    weather_hours: FloatProperty(
+        name="Shot Lasts (h)",
+        description="Hours of weather from the first frame of the bake to the scene's last. Sets Time Scale; as much "
+        "snow lies at the end as before",
+        min=0.0,
+        soft_max=48.0,
+        precision=1,
+        **_worked_out("weather_hours"),
+    )
+    hand_hardness: by_feel(
+        "Hand Hardness",
+        "What you can just push into the snow with your hand: 1 a fist, 2 four fingers, 3 one finger, 4 a pencil, 5 a "
+        "knife. Sets how stiff and how deep the snow is, as boots sank in 19,811 snow pits",
+        hand_hardness.hardness_of,
+        hand_hardness.hardened,
+        min=hand_hardness.FIST,
+        max=hand_hardness.KNIFE,
+        step=33,
+        precision=2,
+    )
+    moisture: by_feel(
+        "Moisture",
+        "How wet the sand is: 0 dry, 0.3 damp, 0.6 wet and firm, 1 soaked. Dry and soaked sand are soft, what is "
+        "between is firm. Sets the stiffness",
+        hand_hardness.moisture_of,
+        hand_hardness.moistened,
+        min=0.0,
+        max=1.0,
+        step=10,
+        precision=2,
     )
     painted: PointerProperty(name="Masks", type=SoftGroundPainted)
     pressure: EnumProperty(
@@ -151,12 +199,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
                 "Pressure follows the force from the heel to the toes: prints have deep heels and toes",
             ),
         ],
-        default="UNIFORM",
+        default=DEFAULT.pressure,
     )
     tread: FloatProperty(
         name="Tread (m)",
         description=_TREAD,
-        default=0.0,
+        default=DEFAULT.tread,
         min=0.0,
         max=0.1,
         soft_max=0.005,
@@ -196,7 +244,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
                 "without a camera), and shoe tread in the mesh",
             ),
         ],
-        default="OFF",
+        default="FINE",
     )
     relief_vertices: IntProperty(
         name="Max Vertices",
@@ -234,7 +282,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         description="Lower the feet into their prints, with hips and knees, as a layer of keys above "
         "the animation. If a rig cannot take the layer, the bake says so and goes on "
         "without it",
-        default=False,
+        default=True,
     )
     has_layers: BoolProperty(
         name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}
@@ -244,7 +292,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         description="Let steps kick up snow, sand, mud and soil, according to their speed and force: "
         "a plume for a run in powder, almost nothing for a walk on firm sand. What flies away "
         "is missing from the rims",
-        default=False,
+        default=DEFAULT.debris,
     )
     steps_feel_weather: BoolProperty(
         name="Steps Feel Weather",

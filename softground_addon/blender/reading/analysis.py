@@ -17,34 +17,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.prediction import (
-    FEW,
-    TAKES_NO_PRINT,
-    ContactLoads,
-    contact_loads,
+    ShotContacts,
     matching_modulus,
+    pressed_again,
+    pressed_contacts,
     typical_depth,
 )
-from ...core.composers.simulation import simulate
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
-from ...core.loads.cell_limits import check_cell_size, pressed_area
+from ...core.loads.cell_limits import Coverage, coverage_of
 from ...core.loads.estimate import CharacterLoads
-from ...core.record.typical_depth import typical_of
 from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..ground import ground_mesh
+from ..state import state
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 
 Array = NDArray[np.float64]
 
-TRIALS = 4
-"""Bakes that a match may compute: two are enough unless feet slide."""
+TRIALS = 3
+"""Moduli that a match may press all contacts with: one is enough unless other contacts become typical."""
 CLOSE_ENOUGH = 0.005
 """Relative error of a matched depth."""
-
 
 _Source = tuple[Mapping[str, Any], Any]
 """Settings that decide what is read of a shot, and where its ground lies."""
@@ -64,9 +61,9 @@ class Analysis:
         Settings that the loads and the contacts depend on beside that.
     shot : Shot
     loads : list of CharacterLoads
-    contacts : ContactLoads
-    area : float
-        That the soles cover on the ground, with each step counted [m²].
+    contacts : ShotContacts
+    coverage : Coverage
+        What the soles cover on the ground.
     """
 
     sources: tuple[_Source, ...]
@@ -74,8 +71,8 @@ class Analysis:
     terms: tuple[Any, ...]
     shot: Shot
     loads: list[CharacterLoads]
-    contacts: ContactLoads
-    area: float
+    contacts: ShotContacts
+    coverage: Coverage
 
     @cached_property
     def belts(self) -> dict[str, Array]:
@@ -85,31 +82,24 @@ class Analysis:
         return {name: -velocity for name, velocity in lacking.items() if velocity is not None}
 
 
-_known: dict[int, Analysis] = {}
-"""By session uid of the scene; a cache only: everything in it can be read again."""
-
-_depths: dict[tuple[int, GroundMaterial, Pressure], float] = {}
-"""Depths that were asked for lately, by identity of an analysis' contacts; emptied with it."""
-
-
 def forget() -> None:
     """Read shots anew from now on."""
-    _known.clear()
-    _depths.clear()
+    state.analyses.clear()
+    state.depths.clear()
 
 
 def look_again() -> None:
     """Forget the shots that were read from something else than what is there now, as after an undo."""
     scenes = {scene.session_uid: scene for scene in bpy.data.scenes}
-    for uid, analysis in list(_known.items()):
+    for uid, analysis in list(state.analyses.items()):
         scene = scenes.get(uid)
         if scene is None or known(scene) is None or _hash_of(scene) not in analysis.hashes:
-            del _known[uid]
+            del state.analyses[uid]
 
 
 def is_empty() -> bool:
     """Whether no shot is known."""
-    return not _known
+    return not state.analyses
 
 
 def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysis | None:
@@ -117,7 +107,7 @@ def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysi
 
     Only looks; see `current`.
     """
-    analysis = _known.get(scene.session_uid)
+    analysis: Analysis | None = state.analyses.get(scene.session_uid)
     return analysis if analysis and _source(scene, wanted or settings.snapshot(scene)) in analysis.sources else None
 
 
@@ -135,7 +125,7 @@ def refreshing(scene: bpy.types.Scene) -> jobs.Job[Analysis | None]:
     try:
         return (yield from _keep(uid, wanted, analysis.shot, analysis.sources, analysis.hashes))
     except InputError:
-        _known.pop(uid, None)
+        state.analyses.pop(uid, None)
         return None
 
 
@@ -159,14 +149,14 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
         source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
         _tell_of_changes(scene)  # response layers were switched off and on again, which is no edit
-        _known[scene.session_uid] = analysis
+        state.analyses[scene.session_uid] = analysis
     return analysis
 
 
 @contextmanager
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
-    if scene.session_uid in _known:
+    if scene.session_uid in state.analyses:
         _tell_of_changes(scene)  # of what others have changed until now, while it still counts
     analysis = known(scene)
     yield
@@ -175,10 +165,10 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     _tell_of_changes(scene)
     source = _source(scene, settings.snapshot(scene))
     if source in analysis.sources:
-        _known[scene.session_uid] = analysis
+        state.analyses[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
         sources, hashes = (*analysis.sources, source), analysis.hashes | {_hash_of(scene)}
-        _known[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
+        state.analyses[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
 def _tell_of_changes(scene: bpy.types.Scene) -> None:
@@ -199,20 +189,15 @@ def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = 
     if analysis is None:
         return None
     key = _key(wanted, analysis, material)
-    if key not in _depths:
+    if key not in state.depths:
         work = typical_depth.slices(analysis.contacts, *key[1:])
-        _depths[key] = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
-    return _depths[key]
-
-
-def deepest(analysis: Analysis, wanted: BakeSettings) -> float:
-    """Depth of the deepest print to expect [m]."""
-    return analysis.contacts.deepest(wanted.material, wanted.pressure, most=FEW)
+        state.depths[key] = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
+    return state.depths[key]
 
 
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:
     """The expected depth [m] if it was asked for since anything has changed that it depends on. Only looks."""
-    return _depths.get(_key(wanted, analysis)) if analysis.terms == _terms(wanted) else None
+    return state.depths.get(_key(wanted, analysis)) if analysis.terms == _terms(wanted) else None
 
 
 def _key(
@@ -230,23 +215,14 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
         If there is none, or the shot cannot be read.
     """
     analysis, wanted = read(scene), settings.snapshot(scene)
-    check_cell_size(analysis.loads, wanted.cell_size_m, wanted.longest_bake_s)
-    aim = depth
+    contacts, material = analysis.contacts, wanted.material
     for _ in range(TRIALS):
-        modulus = matching_modulus(analysis.contacts, wanted.material, aim, wanted.pressure)
-        wanted = replace(wanted, material=replace(wanted.material, youngs_modulus=modulus))
-        reached = _simulated_depth(wanted, analysis)
-        if not reached > 0:
-            raise InputError(TAKES_NO_PRINT)
-        if abs(reached - depth) <= CLOSE_ENOUGH * depth:
+        modulus = matching_modulus(contacts, material, depth, wanted.pressure)
+        material = replace(material, youngs_modulus=modulus)
+        contacts = pressed_again(contacts, material, wanted.pressure)
+        if abs(contacts.typical - depth) <= CLOSE_ENOUGH * depth:
             break
-        aim *= depth / reached  # sliding feet print less deep than predicted
-    return wanted.material.youngs_modulus
-
-
-def _simulated_depth(wanted: BakeSettings, analysis: Analysis) -> float:
-    results = simulate(analysis.loads, ground_of(wanted, analysis.shot), wanted.cell_size_m)
-    return typical_of([footprint for result in results for footprint in result.footprints])
+    return material.youngs_modulus
 
 
 def _keep(
@@ -254,11 +230,12 @@ def _keep(
 ) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on, by the session uid of its scene."""
     loads = yield from estimate_shot(wanted, shot)
-    gathering = contact_loads.slices(loads, shot.terrain, wanted.cell_size_m, shot.variation)
-    contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), gathering)
-    analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, pressed_area(loads))
-    _known[scene] = analysis
-    _depths.clear()
+    pressing = pressed_contacts.slices(loads, ground_of(wanted, shot), wanted.cell_size_m)
+    contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), pressing)
+    analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, coverage_of(loads))
+    state.analyses[scene] = analysis
+    state.depths.clear()
+    state.depths[_key(wanted, analysis)] = contacts.typical
     return analysis
 
 
@@ -284,14 +261,11 @@ def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
     return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
 
 
-_parted: list[tuple[BakeSettings, tuple[dict[str, Any], dict[str, Any]]]] = []
-"""The settings that were taken apart last: panels and overlay ask for the same ones at each drawing."""
-
-
 def _parts(wanted: BakeSettings) -> tuple[dict[str, Any], dict[str, Any]]:
-    if not _parted or _parted[0][0] != wanted:
+    if not state.parted or state.parted[0] != wanted:
         pressing = wanted.between(Acts.LOADS, Acts.PRESSING)
         for asked in ("material", "pressure", "preset"):
             del pressing[asked]
-        _parted[:] = [(wanted, (wanted.between(Acts.READING, Acts.READING), pressing))]
-    return _parted[0][1]
+        state.parted = wanted, (wanted.between(Acts.READING, Acts.READING), pressing)
+    parts: tuple[dict[str, Any], dict[str, Any]] = state.parted[1]
+    return parts

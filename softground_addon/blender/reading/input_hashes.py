@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 
 from .. import mesh_arrays
-from ..animation_layer import nla_layer
+from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.constraint_layer import is_response
 from ..compat import action_curves, node_inputs, slot_of
 from ..ground import ground_mesh
 
@@ -41,8 +42,8 @@ _NO_INPUT = frozenset(
 )
 """Settings that change nothing of what their owner does."""
 
-_ANSWERS = (nla_layer.RESPONSE, nla_layer.EXTRA, nla_layer.STANDING)
-"""Tracks that hold the ground's response to the rig, and not what the rig was animated to do."""
+Known = dict[bpy.types.ID, str]
+"""What data-blocks hold, as far as it was looked at: many bones follow the same objects."""
 
 _LOOKED_AT = 5000
 """Vertices whose weights are compared, spread over the mesh: Blender reads weights one by one."""
@@ -78,6 +79,23 @@ def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
     )
 
 
+def of_shapes(obj: bpy.types.Object) -> str:
+    """What shapes a skin beside bones: its shape keys and modifiers; empty without any."""
+    texts = [text for modifier in obj.modifiers if modifier.type != "ARMATURE" for text in of_settings(modifier)]
+    keys = obj.data.shape_keys
+    if keys is not None:
+        keyed = animated_paths_of(keys)
+        for block in keys.key_blocks:
+            offsets = np.empty(len(block.data) * 3, dtype=np.float32)
+            block.data.foreach_get("co", offsets)
+            value = "" if block.path_from_id("value") in keyed else f"{block.value:.6g}"
+            texts.append(f"{block.name} {block.mute} {value} {zlib.crc32(offsets.data):08x}")
+        texts.append(of_keys(keys))
+        for driver in keys.animation_data.drivers if keys.animation_data else ():
+            texts += _of_driver(driver, {})
+    return joined(texts) if texts else ""
+
+
 def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
     """The values of a float attribute of a mesh; nothing where there is none."""
     attribute: Any = mesh.attributes.get(name)
@@ -92,7 +110,7 @@ def of_place(objects: Iterable[bpy.types.Object]) -> str:
     """Where objects stand in their parents, but for what their own animation decides."""
     values = []
     for one in objects:
-        animated = _animated(one)
+        animated = animated_paths(one)
         values += [
             value
             for channel in _CHANNELS
@@ -103,46 +121,46 @@ def of_place(objects: Iterable[bpy.types.Object]) -> str:
     return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
 
 
-def of_keys(obj: bpy.types.Object) -> str:
+def of_keys(obj: bpy.types.Object | bpy.types.Key) -> str:
     """The keys of the user's own actions and strips, and when they are played."""
     animation = obj.animation_data
     if animation is None:
         return ""
     found = set()
-    action, slot = nla_layer.own_action(obj)
-    if action:
-        found.add(_of_action(action, slot))
-    for track, strip in _own_strips(animation):
+    if animation.action:
+        found.add(_of_action(animation.action, slot_of(animation)))
+    for _, strip in _playing_strips(animation):
         if strip.action is None:
             continue
-        digest = _of_action(strip.action, slot_of(strip))
-        if track.name != nla_layer.SOURCE:
-            influence = None if strip.use_animated_influence else strip.influence
-            placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, influence)
-            digest += f"@{placed}"
-        found.add(digest)
+        influence = None if strip.use_animated_influence else strip.influence
+        placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, influence)
+        found.add(f"{_of_action(strip.action, slot_of(strip))}@{placed}")
     return " ".join(sorted(found))
 
 
-def of_animation(obj: bpy.types.Object) -> str:
-    """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones."""
+def of_animation(obj: bpy.types.Object, known: Known) -> str:
+    """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones.
+
+    Of data-blocks that it follows, `known` has what they hold, as far as it was looked at; they are added.
+    """
     animated = animated_paths_of(obj)
     told: list[str] = [obj.rotation_mode]
     animation = obj.animation_data
     if animation is not None:
-        action, slot = nla_layer.own_action(obj)
-        curves = set(_of_curves(action_curves(action, slot))) if action else set()
-        for track, strip in _own_strips(animation):
+        curves: set[str] = set()
+        if animation.action:
+            curves.update(_of_curves(action_curves(animation.action, slot_of(animation))))
+        for track, strip in _playing_strips(animation):
             if strip.action:
                 curves.update(_of_curves(action_curves(strip.action, slot_of(strip))))
-            if track.name != nla_layer.SOURCE:
-                told += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
+            told += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
         told += sorted(curves)
         for driver in animation.drivers:
-            told += _of_driver(driver)
+            told += _of_driver(driver, known)
     for owner in (obj, *(obj.pose.bones if obj.pose else ())):
         for constraint in owner.constraints:
-            told += of_settings(constraint, animated)
+            if not is_response(constraint):
+                told += of_settings(constraint, animated, known)
     if obj.rigid_body is not None:
         told += of_settings(obj.rigid_body)
     if obj.pose is not None:
@@ -150,8 +168,12 @@ def of_animation(obj: bpy.types.Object) -> str:
     return joined(told)
 
 
-def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
-    """What is set in a modifier, a constraint or the like, but for what is animated; each Blender has settings more."""
+def of_settings(owner: Any, animated: Collection[str] = (), known: Known | None = None) -> Iterator[str]:
+    """What is set in a modifier, a constraint or the like, but for what is animated; each Blender has settings more.
+
+    Data-blocks that it names are compared by what they hold; `known` has that of some.
+    """
+    known = {} if known is None else known
     yield owner.bl_rna.identifier
     path = _path(owner) if animated else ""
     for setting in owner.bl_rna.properties:
@@ -160,7 +182,7 @@ def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
             continue
         if name == "targets":
             for target in owner.targets:
-                yield from of_settings(target, animated)
+                yield from of_settings(target, animated, known)
         elif setting.type != "COLLECTION" and not setting.is_readonly and f"{path}.{name}" not in animated:
             value = getattr(owner, name)
             if setting.subtype in ("FILE_PATH", "DIR_PATH"):
@@ -168,9 +190,9 @@ def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
             if isinstance(value, bpy.types.Texture):
                 yield from of_settings(value)
             elif setting.type != "POINTER" or isinstance(value, bpy.types.ID):
-                yield f"{name} {_plain(value)}"
+                yield f"{name} {_plain(value, known)}"
     if isinstance(owner, bpy.types.NodesModifier):
-        yield from (f"{name} {_plain(value)}" for name, value in node_inputs(owner))
+        yield from (f"{name} {_plain(value, known)}" for name, value in node_inputs(owner))
 
 
 def _path(owner: Any) -> str:
@@ -180,33 +202,50 @@ def _path(owner: Any) -> str:
         return ""
 
 
-def _plain(value: Any) -> str:
-    """A custom property's value as text; of data-blocks their name. Booleans become integers when a file is read."""
+def _plain(value: Any, known: Known) -> str:
+    """A value as text; of data-blocks what they hold. Booleans become integers when a file is read."""
     if isinstance(value, bpy.types.ID):
-        return value.name_full
+        return _of_block(value, known)
     if isinstance(value, bool):
         return str(int(value))
-    return str([_plain(part) for part in value] if hasattr(value, "__len__") and not isinstance(value, str) else value)
+    parts = hasattr(value, "__len__") and not isinstance(value, str)
+    return str([_plain(part, known) for part in value] if parts else value)
 
 
-def animated_paths_of(obj: bpy.types.Object) -> set[str]:
+def _of_block(block: bpy.types.ID, known: Known) -> str:
+    """What a data-block is, whatever its name."""
+    if block not in known:
+        known[block] = ""  # groups may hold each other
+        if isinstance(block, bpy.types.Object):
+            told = [of_place([block]), of_keys(block)]
+        elif isinstance(block, bpy.types.Collection):
+            told = sorted(_of_block(obj, known) for obj in block.all_objects)
+        elif isinstance(block, bpy.types.NodeTree):
+            told = [*_of_nodes(block, known)]
+        else:
+            told = [block.bl_rna.identifier, bpy.path.basename(getattr(block, "filepath", ""))]
+        known[block] = joined(told)
+    return known[block]
+
+
+def _of_nodes(tree: Any, known: Known) -> Iterator[str]:
+    """The nodes of a group and what is set in their sockets, unless something animates that."""
+    yield str(len(tree.links))
+    for node in tree.nodes:
+        yield f"{node.bl_idname} {_plain(getattr(node, 'node_tree', None), known)}"
+        if tree.animation_data is None:
+            values = (getattr(socket, "default_value", "") for socket in (*node.inputs, *node.outputs))
+            yield from (_plain(value, known) for value in values)
+
+
+def animated_paths_of(obj: bpy.types.Object | bpy.types.Key) -> set[str]:
     """Data paths that something sets at each frame."""
-    return {path for path, _ in _animated(obj)}
+    return {path for path, _ in animated_paths(obj)}
 
 
-def _animated(obj: bpy.types.Object) -> set[tuple[str, int]]:
-    """Data paths and indices that something sets at each frame, the ground's response to the rig included."""
-    animation = obj.animation_data
-    action = animation and animation.action
-    answer = action_curves(action, slot_of(animation)) if action else ()
-    return nla_layer.animated_paths(obj) | {(curve.data_path, curve.array_index) for curve in answer}
-
-
-def _own_strips(animation: bpy.types.AnimData) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """The user's strips that play, with their tracks."""
-    for track in animation.nla_tracks:
-        if track.name not in _ANSWERS and (not track.mute or track.name == nla_layer.SOURCE):
-            yield from ((track, strip) for strip in track.strips)
+def _playing_strips(animation: bpy.types.AnimData) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
+    """Strips of the tracks that are not muted, with their tracks."""
+    return ((track, strip) for track in animation.nla_tracks if not track.mute for strip in track.strips)
 
 
 def _of_action(action: bpy.types.Action, slot: Any) -> str:
@@ -242,7 +281,7 @@ def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
         yield from (f"{key.co[0]:.6g} {key.co[1]:.6g}" for key in curve.keyframe_points)
 
 
-def _of_driver(curve: bpy.types.FCurve) -> Iterator[str]:
+def _of_driver(curve: bpy.types.FCurve, known: Known) -> Iterator[str]:
     """What a driver computes, and the custom properties that it reads."""
     driver: Any = curve.driver
     yield f"{curve.data_path} {curve.array_index} {curve.mute} {driver.type} {driver.expression}"
@@ -250,11 +289,11 @@ def _of_driver(curve: bpy.types.FCurve) -> Iterator[str]:
     for variable in driver.variables:
         yield f"{variable.name} {variable.type}"
         for target in variable.targets:
-            yield f"{target.id.name_full if target.id else ''} {target.data_path} {target.bone_target}"
-            yield f"{target.transform_type} {target.transform_space} {target.rotation_mode} {_value_of(target)}"
+            yield f"{_plain(target.id, known)} {target.data_path} {target.bone_target}"
+            yield f"{target.transform_type} {target.transform_space} {target.rotation_mode} {_value_of(target, known)}"
 
 
-def _value_of(target: Any) -> str:
+def _value_of(target: Any, known: Known) -> str:
     """The value of a custom property that a driver reads, unless it is animated itself."""
     path = target.data_path
     if not path.endswith('"]') or not target.id:
@@ -262,7 +301,7 @@ def _value_of(target: Any) -> str:
     if isinstance(target.id, bpy.types.Object) and path in animated_paths_of(target.id):
         return ""
     try:
-        return _plain(target.id.path_resolve(path))
+        return _plain(target.id.path_resolve(path), known)
     except ValueError:
         return "missing"
 
@@ -278,7 +317,7 @@ def _of_bones(obj: bpy.types.Object) -> Iterator[str]:
         values = np.empty(len(armature.bones) * (16 if part == "matrix_local" else 3), dtype=np.float32)
         armature.bones.foreach_get(part, values)
         yield f"{zlib.crc32(values.data):08x}"
-    animated = _animated(obj)
+    animated = animated_paths(obj)
     for bone in obj.pose.bones:
         path = bone.path_from_id()
         pose = [

@@ -8,11 +8,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.felt_weather import weathering_of
 from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
 from ...core.composers.relief_plan import IMAGE
 from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
+from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
@@ -22,15 +22,19 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings
-from .. import settings, tread_images
-from ..characters.control_poses import PoseRecorder
+from ...core.weather.felt_weather import weathering_of
+from .. import setting_paths, settings, tread_images
+from ..animation_layer.constraint_layer import LayerKind
 from ..characters.import_fixes import size_of
-from ..characters.prop_extraction import check_props
-from ..characters.rig_sampling import check_rig, sample_character, sample_prop
-from ..ground import ground_checks, ground_mesh, painted_ground, weather
+from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..response.character_keys import ReadRig, controls_of
+from ..rigs.rig_mapping import require_armature
+from ..sampling.control_poses import RigPoses
+from ..sampling.prop_extraction import check_props
+from ..sampling.rig_sampling import check_rig, sample_character, sample_prop
+from ..weather import ground_weather as weather
 
 Array = NDArray[np.float64]
 
@@ -53,6 +57,8 @@ class Shot:
         The undisturbed ground.
     rigs : tuple of ReadRig
         Of the characters that have one, where they are to respond.
+    findings : tuple of Finding
+        What the user should know of how it was read.
     """
 
     motions: tuple[CharacterMotion, ...]
@@ -62,6 +68,7 @@ class Shot:
     surface: GroundSurface | None
     terrain: Terrain
     rigs: tuple[ReadRig, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def variation(self) -> PaintedSurface | None:
@@ -79,7 +86,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
         If not; names what is wrong and the remedy.
     """
     settings.forget_deleted_ground(scene)
-    settings.check_stored(scene.softground)
+    setting_paths.check_stored(scene.softground)
     for character in scene.softground.characters:
         if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
             raise InputError(
@@ -95,29 +102,34 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
             "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
             "Character."
         )
+    ground = settings.found(wanted.ground) if wanted.ground else None
     for one in wanted.characters:
-        check_props(scene, one.name, one.soles)
+        if one.armature:
+            require_armature(settings.found(one.armature))
+        check_props(scene, one.name, one.soles, ground)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
-    if wanted.ground is not None:
-        ground_checks.check_usable(settings.found(wanted.ground))
+    if ground is not None:
+        ground_checks.check_usable(ground)
     return wanted
 
 
-def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
-    """What the scene's characters do, and the ground that they do it on.
+def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
+    """What the scene's characters do below a layer, and the ground that they do it on.
 
     Raises
     ------
     InputError
         If a character or the ground cannot be used; names it and the remedy.
     """
-    motions, rigs = yield from sample_characters(scene, wanted)
+    findings: list[Finding] = []
+    motions, rigs = yield from sample_characters(scene, wanted, below, findings)
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain, rigs)
+        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain, rigs, tuple(findings))
+    yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
     surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
@@ -127,13 +139,13 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
     places = np.concatenate([[lower, upper], *skins])
     work = ground_mesh.terrain_of.slices(surface, np.stack([places.min(axis=0), places.max(axis=0)]))
     terrain = yield from meanwhile(Progress("sample", 1.0), work)
-    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs)
+    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, tuple(findings))
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     """The ground of a shot, with the material and the spread of pressure that are wanted."""
     weathering = weathering_of(wanted.weather, wanted.material.layer_depth)
-    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation, weathering)
+    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation, weathering, wanted.gravity_m_s2)
 
 
 def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]:
@@ -155,20 +167,23 @@ def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
 
 
 def sample_characters(
-    scene: bpy.types.Scene, wanted: BakeSettings
+    scene: bpy.types.Scene,
+    wanted: BakeSettings,
+    below: LayerKind = LayerKind.RESPONSE,
+    findings: list[Finding] | None = None,
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
     motions, rigs = [], []
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, one in enumerate(wanted.characters):
-        mapping, recorder = RigMapping(one.joints, one.soles, "settings"), None
+        mapping, poses = RigMapping(one.joints, one.soles, "settings"), None
         if one.armature:
             armature = settings.found(one.armature)
             if wanted.response:
                 check_rig(scene, armature, mapping, one.mass_kg)
                 controls = controls_of(scene, armature, mapping)
-                recorder = PoseRecorder([control.bone for control in controls], len(frames))
+                poses = RigPoses([control.bone for control in controls])
             grown = size_of(scene, armature) / one.size_m if one.size_m else 1.0
             job = sample_character(
                 scene,
@@ -177,12 +192,16 @@ def sample_characters(
                 mass=one.mass_kg,
                 skin_mass=one.skin_mass_kg * grown**3,
                 frames=frames,
-                recorder=recorder,
+                poses=poses,
+                below=below,
                 units=wanted,
+                findings=findings,
             )
         else:
-            job = sample_prop(scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted)
+            job = sample_prop(
+                scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted, findings=findings
+            )
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
-        if recorder:
-            rigs.append(ReadRig(controls, recorder.poses()))
+        if poses:
+            rigs.append(ReadRig(controls, poses))
     return motions, tuple(rigs)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -14,30 +15,24 @@ from ...core.errors import InputError
 from ...core.files import report
 from ...core.settings import Acts, BakeSettings, CharacterSettings
 from .. import settings
-from ..characters.frame_ranges import ancestors, leaders
-from ..characters.rig_sampling import object_named
-from ..characters.skin_sampling import meshes_on
 from ..compat import SERIES
-from ..ground import ground_mesh, painted_ground, playback, weather_modifier
+from ..ground import baked_ground, ground_mesh, painted_ground
 from ..ground.baked_ground import display_mesh_of
-from ..ground.own_data import FINGERPRINTS
+from ..playback import playback, weather_modifier
+from ..playback.own_data import FINGERPRINTS
+from ..rigs.frame_ranges import ancestors, leaders
+from ..sampling.rig_sampling import object_named
+from ..sampling.skin_sampling import meshes_on
 from . import input_hashes
 
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
 ANIMATION, PLACE, MOVEMENT, BODY, SOLE = "animation", "place", "movement", "body", "sole"
 VERSION = "version"
-_WRITING = "writing"
-"""Of version 0.1: how its prints were put on the ground."""
-_OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY, SOLE)
+_OF_MOVERS = (ANIMATION, PLACE, MOVEMENT, BODY)
+_OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _UNKNOWN = "The bake has no record of its settings"
-
-_OF_0_1 = (
-    *("ground", "characters", "preset", "material", "pressure", "painted", "cell_size_m", "frames"),
-    *("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "response"),
-)
-"""Settings of which bakes of version 0.1 hold one hash."""
 
 
 def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[str, str]) -> None:
@@ -51,8 +46,7 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
     hashes : mapping of str to str
         From `of_movers` and `of_soles`, as they were when they were read.
     """
-    painted = inputs["painted"]
-    stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, painted), **hashes}
+    stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, inputs["painted"]), **hashes}
     ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(stamp)
 
 
@@ -82,32 +76,29 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     wanted : BakeSettings
         What a bake would be made with now.
     """
-    if wanted.ground is None:
-        return ()
+    deletion = _deletion_of(scene.softground.ground)
+    if deletion or wanted.ground is None:
+        return deletion
     ground = settings.found(wanted.ground)
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
-    if edited := next((obj for obj in (ground, display_mesh, *_bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
+    if edited := next((obj for obj in (ground, display_mesh, *bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
         return (f"'{edited.name}' is in Edit Mode",)
     if playback.modifier_of(display_mesh) is None:
         return (f"'{display_mesh.name}' has lost its playback modifier, and its prints no longer move",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
-        inputs = wanted.inputs(Acts.WRITING)
-        now = {**_of_settings(inputs), **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
+        of_settings = _of_settings(wanted.inputs(Acts.WRITING))
+        now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
         soles = {key: value for key, value in then.items() if key.startswith(f"{SOLE}:")}
         now |= soles | of_soles(scene, [key.removeprefix(f"{SOLE}:") for key in soles])  # those that are gone last
-        if SETTINGS in then:
-            now |= _as_in_0_1(inputs)
-        left_out = (VERSION,) if then.get(VERSION) == SERIES else _OF_VERSION
-        told = (key for key in then if key.partition(":")[0] not in left_out)  # earlier bakes tell of less
-        changed = [key for key in told if then[key] != now.get(key)]
+        left_out = () if then.pop(VERSION, "") == SERIES else _OF_VERSION
+        changed = [(kind, name) for kind, name in _changes(then, now) if kind not in left_out]
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
         return (_UNKNOWN,)
     texts = {
         SETTINGS: "The settings have changed",
-        _WRITING: "The settings have changed",
         GROUND: f"The mesh or the position of '{ground.name}' has changed",
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{display_mesh.name}' has been edited",
@@ -119,16 +110,43 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         BODY: "The mesh of '{}' that prints has changed",
         SOLE: "The mesh of '{}', whose sole presses steps, has changed",
     }
-    kinds = (key.partition(":") for key in changed)
     return tuple(
-        dict.fromkeys(texts.get(kind) or of_objects.get(kind, _UNKNOWN).format(name) for kind, _, name in kinds)
+        dict.fromkeys(texts.get(kind) or of_objects.get(kind, _UNKNOWN).format(name) for kind, name in changed)
     )
+
+
+def _changes(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Kind and present name of each hash that is another now, of those that were noted."""
+    current = _in_order(now)
+    for place, (name, value) in _in_order(then).items():
+        new_name, new_value = current.get(place, (name, None))
+        if value != new_value:
+            yield place[0], new_name
+
+
+def _in_order(hashes: Mapping[str, str]) -> dict[tuple[str, str], tuple[str, str]]:
+    """Hashes with the names that they are under: by kind, and by place among those of the kind, as movers may have been
+    renamed; else by name."""
+    found: dict[tuple[str, str], tuple[str, str]] = {}
+    count = Counter[str]()
+    for key, value in hashes.items():
+        kind, _, name = key.partition(":")
+        found[kind, str(count[kind]) if kind in _OF_MOVERS else name] = name, value
+        count[kind] += 1
+    return found
+
+
+def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
+    if ground is None or not baked_ground.is_deleted(ground):
+        return ()
+    what = "The copy of '{}' that shows the prints" if settings.exists(ground) else "'{}'"
+    return (f"{what.format(ground.name)} was deleted",)
 
 
 def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
     ground = settings.found(wanted.ground) if wanted.ground else None
-    movers = [obj for one in wanted.characters for obj in _movers_of(one)]
+    movers = [obj for one in wanted.characters for obj in movers_of(one)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
@@ -160,21 +178,14 @@ def of_ground(wanted: BakeSettings) -> dict[str, str]:
 
 
 def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
-    """A hash of each setting; of one that was not there yet, earlier bakes do not tell."""
-    return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in inputs.items()}
-
-
-def _as_in_0_1(inputs: Mapping[str, Any]) -> dict[str, str]:
-    known = {name: inputs[name] for name in _OF_0_1}
-    known["characters"] = [
-        {key: value for key, value in one.items() if key not in ("skin_mass_kg", "size_m")}
-        | {"soles": [{key: value for key, value in sole.items() if key != "parts" or value} for sole in one["soles"]]}
-        for one in known["characters"]  # which were not weighed, and whose soles had no parts yet
+    """A hash of each setting; what has only been renamed is the same."""
+    nameless = [
+        {**one, "name": "", "armature": bool(one["armature"])}
+        | {"soles": [{**sole, "object": bool(sole["object"])} for sole in one["soles"]]}
+        for one in inputs["characters"]
     ]
-    return {
-        SETTINGS: report.hash_inputs(known),
-        _WRITING: f"{inputs['detail']} {inputs['shape_keys']}",
-    }
+    compared = {**inputs, "ground": "", "characters": nameless}
+    return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
 
 def _of_bake(ground: bpy.types.Object, painted: Sequence[str]) -> dict[str, str]:
@@ -223,23 +234,25 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
     """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
-    told = [input_hashes.of_animation(mover)]
     parents = ancestors(mover)
     known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
+    # All of these are compared by themselves: here it counts only which is followed.
+    blocks: input_hashes.Known = {one: str(n) for n, one in enumerate((mover, *parents, *([ground] if ground else ())))}
+    told = [input_hashes.of_animation(mover, blocks)]
     waiting = [*parents, *leaders(mover)]
     while waiting:
         one = waiting.pop()
         if one in known:
             continue
         known.add(one)
-        told += [input_hashes.of_keys(one), input_hashes.of_animation(one)]
+        told += [input_hashes.of_keys(one), input_hashes.of_animation(one, blocks)]
         if one not in parents:
             told.append(input_hashes.of_place([one]))
         waiting += [*([one.parent] if one.parent else []), *leaders(one)]
     return input_hashes.joined(sorted(told))
 
 
-def _movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
+def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
     """The armature and the objects of a character."""
     return [*([settings.found(character.armature)] if character.armature else []), *_things_of(character)]
 
@@ -253,7 +266,7 @@ def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.t
     return meshes_on(scene, settings.found(character.armature)) if character.armature else []
 
 
-def _bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
+def bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
     return [obj for one in wanted.characters for obj in (*_worn_by(scene, one), *_things_of(one))]
 
@@ -267,6 +280,7 @@ def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
         told.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
     told += [
         f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
+        f"{input_hashes.of_shapes(worn)}"
         for worn in _worn_by(scene, character)
     ]
     return input_hashes.joined(sorted(told))

@@ -1,1 +1,1 @@
-"""What the pressed ground does to the characters, as keys on their rigs."""
+"""Response of the characters to the pressed ground, as keys on their rigs."""

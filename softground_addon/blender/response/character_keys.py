@@ -9,29 +9,30 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.legs.grounding import Response
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.key_reduction import kept_samples
-from ...core.numerics.orientation import euler_angles, quaternions, rotation_matrices
-from ...core.numerics.rigid import carried, rotation, unit
-from ...core.response.grounding import Response
+from ...core.numerics.orientation import quaternions
+from ...core.numerics.rigid import carried
 from ...core.rig.mapping import RigMapping
 from ...core.settings import ObjectName
-from ..animation_layer.layer_curves import LayerCurve
-from ..characters.control_poses import BonePoses, RigPoses
+from ..animation_layer.layer_curves import LayerCurve, path_of_bone
+from ..sampling.control_poses import RigPoses
+from ..sampling.rig_sampling import check_bones
 from ..settings import found
 from .rig_controls import BODY, Control, find_controls
 
 Array = NDArray[np.float64]
 
 ANGLE_TOLERANCE = np.radians(0.04)
-"""A key is left out where its neighbours give the angle to this [rad]: a leg has four joints whose errors add."""
+"""Largest error of angles between keys [rad]: a leg has four joints whose errors add."""
 LENGTH_TOLERANCE = 2e-4
 """The same for places [m]."""
 
 
 @dataclass(frozen=True)
 class ReadRig:
-    """A rig as it was read: the bones that a response is keyed on, and how they stand by the user's animation alone."""
+    """A rig as it was read: the bones that a response is keyed on, and their poses by the user's animation alone."""
 
     controls: list[Control]
     poses: RigPoses
@@ -83,8 +84,9 @@ def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Rig
     Raises
     ------
     InputError
-        If it has no bone that carries the body.
+        If it has no bone that carries the body, or bones of the mapping are gone.
     """
+    check_bones(armature, mapping)
     depsgraph = scene.view_layers[0].depsgraph
     assert depsgraph is not None
     return find_controls(armature, armature.evaluated_get(depsgraph), mapping)
@@ -121,68 +123,37 @@ def _bone_curves(
     metre: float,
     accuracy: float,
 ) -> list[LayerCurve]:
-    bone, pose = armature.pose.bones[control.bone], poses.bones[control.bone]
-    basis = _basis(bone.rotation_mode, pose)
+    """Keys of a bone's displacement, applied from the right: that of its part beyond that of its parents."""
+    pose = poses.matrices[control.bone]
     root_control = moved.get(control.carried_by)
     if root_control is None:
-        root_control = np.broadcast_to(np.eye(4), pose.matrix.shape)
-    elif not bone.bone.use_inherit_rotation:
-        root_control = _translation_at(root_control, pose.matrix[:, :3, 3])
-    # The parent's frame T satisfies matrix = T·basis and moves with the root control, whatever the bone inherits.
-    new = basis @ np.linalg.inv(pose.matrix) @ np.linalg.inv(root_control) @ moved[control.part] @ pose.matrix
+        root_control = np.broadcast_to(np.eye(4), pose.shape)
+    elif not armature.data.bones[control.bone].use_inherit_rotation:
+        root_control = _translation_at(root_control, pose[:, :3, 3])
+    change = np.linalg.inv(root_control @ pose) @ moved[control.part] @ pose
     size = float(np.linalg.norm(poses.world[0, :3, 0])) * metre
-    path = f'pose.bones["{bpy.utils.escape_identifier(control.bone)}"].'
     curves = []
     if control.moves:
-        offset = new[:, :3, 3] - pose.location
-        curves += _curves(
-            path + "location", control.bone, frames, offset, accuracy * LENGTH_TOLERANCE / max(size, 1e-12)
-        )
-    name, values, tolerance = _rotation_layer(bone.rotation_mode, pose, _pure_rotation(new))
-    return curves + _curves(path + name, control.bone, frames, values, accuracy * tolerance)
+        tolerance = accuracy * LENGTH_TOLERANCE / max(size, 1e-12)
+        curves += _curves(control.bone, "location", frames, change[:, :3, 3], np.zeros(3), tolerance)
+    turns = quaternions(_pure_rotation(change))
+    no_turn = np.array([1.0, 0.0, 0.0, 0.0])
+    return curves + _curves(control.bone, "rotation_quaternion", frames, turns, no_turn, accuracy * ANGLE_TOLERANCE / 2)
 
 
-def _curves(path: str, bone: str, frames: Array, values: Array, tolerance: float) -> list[LayerCurve]:
-    kept = kept_samples(values, tolerance)
-    return [LayerCurve(path, index, bone, frames[kept], values[kept, index]) for index in range(values.shape[1])]
+AT_ONCE = 1 / 64
+"""Frames outside the baked ones in which a response begins and ends."""
 
 
-def _basis(mode: str, pose: BonePoses) -> Array:
-    """What a bone's channels make of it, (F, 4, 4)."""
-    basis = np.zeros_like(pose.matrix)
-    basis[:, :3, :3] = _channel_rotation(mode, pose) * pose.scale[:, None, :]
-    basis[:, :3, 3] = pose.location
-    basis[:, 3, 3] = 1.0
-    return basis
-
-
-def _channel_rotation(mode: str, pose: BonePoses) -> Array:
-    if mode == "QUATERNION":
-        return rotation_matrices(pose.rotation_quaternion)
-    if mode == "AXIS_ANGLE":
-        axis = unit(pose.rotation_axis_angle[:, 1:])
-        axis[~axis.any(axis=1)] = (0.0, 1.0, 0.0)
-        return rotation(pose.rotation_axis_angle[:, :1] * axis)
-    turns = {axis: rotation(pose.rotation_euler * about) for axis, about in zip("XYZ", np.eye(3), strict=True)}
-    return turns[mode[2]] @ turns[mode[1]] @ turns[mode[0]]
-
-
-def _rotation_layer(mode: str, pose: BonePoses, new: Array) -> tuple[str, Array, float]:
-    """Channel, values to combine with the source's, and the tolerance of its keys."""
-    if mode == "QUATERNION":
-        source = rotation_matrices(pose.rotation_quaternion)
-        return "rotation_quaternion", quaternions(np.swapaxes(source, -1, -2) @ new), ANGLE_TOLERANCE / 2
-    if mode == "AXIS_ANGLE":
-        target = quaternions(new)
-        angle = 2 * np.arccos(np.clip(target[:, :1], -1, 1))
-        sine = np.sin(angle / 2)
-        axis = np.where(sine > 1e-9, target[:, 1:] / np.maximum(sine, 1e-9), (0.0, 1.0, 0.0))
-        flip = np.where(np.sum(axis * pose.rotation_axis_angle[:, 1:], axis=1, keepdims=True) < 0, -1.0, 1.0)
-        values = np.concatenate([angle * flip, axis * flip], axis=1)
-        values[:, 0] += 2 * np.pi * np.rint((pose.rotation_axis_angle[:, 0] - values[:, 0]) / (2 * np.pi))
-        return "rotation_axis_angle", values - pose.rotation_axis_angle, ANGLE_TOLERANCE / 2
-    angles = euler_angles(new, mode, pose.rotation_euler)
-    return "rotation_euler", angles - pose.rotation_euler, ANGLE_TOLERANCE
+def _curves(
+    bone: str, channel: str, frames: Array, values: Array, neutral: Array, tolerance: float
+) -> list[LayerCurve]:
+    """Curves with the fewest keys within the tolerance, between neutral keys before the first and after the last."""
+    needed = kept_samples(values, tolerance)
+    times = np.concatenate([frames[:1] - AT_ONCE, frames[needed], frames[-1:] + AT_ONCE])
+    keyed = np.concatenate([neutral[None], values[needed], neutral[None]])
+    path = path_of_bone(bone, channel)
+    return [LayerCurve(path, index, bone, times, column) for index, column in enumerate(keyed.T)]
 
 
 def _pure_rotation(matrices: Array) -> Array:
@@ -191,7 +162,7 @@ def _pure_rotation(matrices: Array) -> Array:
 
 
 def _translation_at(displacement: Array, points: Array) -> Array:
-    """How far displacements (F, 4, 4) carry points (F, 3), as displacements that do not turn."""
+    """Translations of points (F, 3) by displacements (F, 4, 4), as displacements that do not turn."""
     result = np.broadcast_to(np.eye(4), displacement.shape).copy()
     result[:, :3, 3] = carried(displacement, points) - points
     return result

@@ -1,10 +1,11 @@
-"""The characters' side of a bake: whether their rigs can take what the settings ask for, and the layers that do it."""
+"""The characters' side of a bake: checks that their rigs can respond as the settings ask, and the layers that do it."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 
@@ -15,7 +16,15 @@ from ...core.response.performance import suggested_speed
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings
 from .. import settings
-from ..animation_layer import nla_layer
+from ..animation_layer.constraint_layer import (
+    LayerKind,
+    check_layerable,
+    has_layer,
+    put_layer,
+    remove_layer,
+    set_strength,
+)
+from ..animation_layer.layer_curves import LayerCurve
 from ..jobs import Job, counted
 from .character_keys import ReadRig, controls_of, response_curves
 
@@ -25,37 +34,43 @@ SHARE_OF_WRITING = 0.1
 
 @dataclass(frozen=True)
 class Layer:
-    """One character's keys, and what the panel says of them."""
+    """One character's keys, and the panel's notes on them."""
 
-    curves: list[nla_layer.LayerCurve]
+    curves: list[LayerCurve]
     notes: dict[str, str]
 
 
 def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
-    """Those that can respond to the ground, with their armatures: props without a rig cannot."""
-    return [(one, settings.found(one.armature)) for one in characters if one.armature]
+    """Characters that can respond to the ground, with their armatures: props without a rig cannot."""
+    return [(each, settings.found(each.armature)) for each in characters if each.armature]
 
 
 def check_characters(characters: Iterable[CharacterSettings]) -> None:
     """Raise InputError, naming the remedy, where a character can take no layer."""
     for _, armature in rigged(characters):
-        nla_layer.check_layerable(armature)
+        check_layerable(armature)
 
 
 def _refusal(scene: bpy.types.Scene, characters: Sequence[CharacterSettings]) -> str:
-    """Why feet cannot be let down by a layer, and what to do; empty where they can."""
+    """Reason why a layer cannot let feet down, with the remedy; empty if it can."""
     try:
         check_characters(characters)
-        for one, armature in rigged(characters):
-            controls_of(scene, armature, RigMapping(one.joints, one.soles, "settings"))
+        for character, armature in rigged(characters):
+            controls_of(scene, armature, RigMapping(character.joints, character.soles, "settings"))
     except InputError as error:
         return str(error)
     return ""
 
 
 def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeSettings, list[Finding]]:
-    """The settings without the layer that lets feet down, where a rig cannot take it; the finding that says so."""
-    if not wanted.sink_feet or wanted.output != "BOTH" or wanted.response is None or wanted.response.tilt:
+    """The settings without the layer that lowers feet, where a rig cannot take it, and the finding about it.
+
+    Raises InputError if another response is wanted.
+    """
+    if wanted.response is None or wanted.output == "PRINTS":
+        return wanted, []
+    if not wanted.sink_feet or wanted.output != "BOTH" or wanted.response.tilt:
+        check_characters(wanted.characters)
         return wanted, []
     why = _refusal(scene, wanted.characters)
     if not why:
@@ -64,6 +79,24 @@ def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeS
         "feet_not_sunk", "note", f"Feet were not lowered into their prints. {why}", "Or switch Sink Feet off."
     )
     return replace(wanted, response=None), [said]
+
+
+SOURCE = "softground_source"
+"""Property of an action with a response in its keys: name of the action that it was made from."""
+
+
+def keyed_responses(wanted: BakeSettings) -> list[Finding]:
+    """Warnings that characters play keys in which a response is already, and would respond twice."""
+    return [
+        Finding(
+            "response_in_keys",
+            "warning",
+            f"'{armature.name}' plays '{action.name}', whose feet are in the prints of an earlier bake already.",
+            f"Assign {repr(action[SOURCE]) if action[SOURCE] else 'the animation without them'} and bake again.",
+        )
+        for _, armature in rigged(wanted.characters)
+        if armature.animation_data and (action := armature.animation_data.action) and SOURCE in action.keys()  # noqa: SIM118
+    ]
 
 
 def layers_of(
@@ -75,7 +108,7 @@ def layers_of(
 ) -> Job[list[Layer]]:
     """The keys of each character's layer, of rigs as they were read; none without responses."""
     layers: list[Layer] = []
-    names = [one.armature for one in wanted.characters if one.armature]
+    names = [each.armature for each in wanted.characters if each.armature]
     for number, (name, rig, character) in enumerate(zip(names, rigs, responses, strict=False)):
         work = response_curves(
             name,
@@ -97,7 +130,7 @@ ROOT_CONTROL = "softground_carrier"
 SPEED = "softground_suggested_speed"
 """Note of the speed that people would choose on this ground, over that on hard ground."""
 WORST = "softground_worst_gaps"
-"""Note of the frames where a gap is left, as JSON."""
+"""Note of the frames where a gap remains, as JSON."""
 
 
 def speed_in(notes: Mapping[str, str]) -> float:
@@ -110,7 +143,7 @@ def speed_in(notes: Mapping[str, str]) -> float:
 
 
 def worst_gaps_in(notes: Mapping[str, str]) -> list[tuple[float, float, str]]:
-    """Frame, gap [mm] and sole of what is noted with a layer as left; nothing where something else is noted."""
+    """Frame, gap [mm] and sole of the remaining gaps in the notes of a layer; nothing if the note is damaged."""
     try:
         gaps = json.loads(notes[WORST])
         return [(float(gap["frame"]), float(gap["gap_mm"]), str(gap["contact"])) for gap in gaps]
@@ -126,39 +159,40 @@ def _notes(root_control: str, character: CharacterResponse) -> dict[str, str]:
     }
 
 
-def put_layers(scene: bpy.types.Scene, wanted: BakeSettings, layers: Sequence[Layer]) -> None:
-    """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
-    start, end = (frame * wanted.time_stretch for frame in wanted.frames)
+def put_layers(
+    scene: bpy.types.Scene, wanted: BakeSettings, layers: Sequence[Layer], kind: LayerKind = LayerKind.RESPONSE
+) -> None:
+    """Put each character's layer in the place of an earlier one; take that off where there is none now."""
     for number, (_, armature) in enumerate(rigged(wanted.characters)):
         if number < len(layers) and layers[number].curves:
-            nla_layer.add_layer(armature, layers[number].curves, (start, end), layers[number].notes)
-            for shown in scene.softground.characters:  # how much of it shows is told at any time, and not by a bake
-                if shown.armature == armature:
-                    nla_layer.set_strength(armature, settings.typed(shown.response_strength))
-            scene.softground.has_layers = True
+            show_layer(scene, armature, kind, layers[number])
         else:
-            nla_layer.remove_layer(armature)
+            remove_layer(armature, kind)
 
 
-def remove_layers(scene: bpy.types.Scene) -> bool:
-    """Take the layers off all armatures of the scene; whether there was one."""
-    layered = list(_layered(scene))
-    for armature in layered:
-        nla_layer.remove_layer(armature)
-    scene.softground.has_layers = False
-    for layer in scene.view_layers:
-        layer.update()
-    return bool(layered)
+def show_layer(scene: bpy.types.Scene, armature: bpy.types.Object, kind: LayerKind, layer: Layer) -> None:
+    """Put a layer on an armature, as strong as its character has it."""
+    put_layer(armature, kind, layer.curves, layer.notes)
+    for character in scene.softground.characters:
+        if character.armature == armature:
+            set_strength(armature, kind, settings.typed(getattr(character, kind.strength)))
+    scene.softground.has_layers |= kind in BAKED
 
 
-def has_layers(scene: bpy.types.Scene) -> bool:
-    """Whether any armature of the scene may have a layer; quick enough for `poll`."""
-    options = scene.softground
-    armatures = (one.armature for one in options.characters if one.armature)
-    return options.has_layers or any(map(nla_layer.has_layer, armatures))  # files of 0.1 have no note of it
+BAKED = (LayerKind.CLEAN_FEET, LayerKind.RESPONSE)
+"""Layers that Clear Bake removes: root motion is a part of the animation."""
 
 
-def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
-    """Armatures with a layer: of characters, and of what was one when it was baked."""
-    armatures = (obj for obj in scene.objects if obj.type == "ARMATURE" and obj.library is None)
-    return (armature for armature in armatures if nla_layer.has_layer(armature))
+def has_layers(options: Any) -> bool:
+    """True if an armature of the scene may have a layer that Clear Bake removes; quick enough for `poll`."""
+    armatures = (each.armature for each in options.characters if each.armature)
+    return options.has_layers or any(has_layer(armature, kind) for armature in armatures for kind in BAKED)
+
+
+def remove_layers(scene: bpy.types.Scene, *kinds: LayerKind) -> None:
+    """Take layers of these kinds off all armatures of the scene, also of those that are no characters any more."""
+    armatures = [obj for obj in scene.objects if obj.type == "ARMATURE" and obj.library is None]
+    removed = [remove_layer(armature, kind) for armature in armatures for kind in kinds]
+    scene.softground.has_layers = any(has_layer(armature, kind) for armature in armatures for kind in BAKED)
+    for view_layer in scene.view_layers if any(removed) else ():  # Blender goes through all objects for it
+        view_layer.update()

@@ -1,7 +1,7 @@
-"""Which bones move a character: the one that carries its body, and the FK bones or IK controls of its legs.
+"""Bones that move a character: the one that carries its body, and the FK bones or IK controls of its legs.
 
 Rigs are read as a graph: a bone goes where its parent goes, or where its constraints copy it from. The bones that are
-mapped to joints mostly sit at the end of that graph; what an animator keys sits at its start.
+mapped to joints mostly sit at the end of that graph; the bones that an animator keys sit at its start.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ import bpy
 
 from ...core.errors import InputError
 from ...core.rig.mapping import RigMapping
-from ..animation_layer.nla_layer import animated_paths
-from ..characters.rig_mapping import CHOOSE_CONTACTS
+from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.constraint_layer import is_own
+from ..rigs.rig_mapping import CHOOSE_CONTACTS
 
 _FOLLOWED = 0.5
 """Influence from which on a constraint counts."""
 _REPLACING = 0.999
-"""Influence from which on a constraint that copies a whole transform leaves nothing of what was before."""
+"""Influence from which on a constraint that copies a whole transform replaces the pose."""
 
 BODY = "body"
 
@@ -33,12 +34,12 @@ class Control:
     ----------
     bone : str
     part : str
-        What it moves with: "body", or "thigh", "shank", "foot", "knee", "arm" and a side, e.g.
+        Part that it moves with: "body", or "thigh", "shank", "foot", "knee", "arm" and a side, e.g.
         "thigh_l".
     carried_by : str
         The part that its parents move with already; empty if none of them is keyed.
     moves : bool
-        Whether its location is keyed beside its rotation.
+        True if its location is keyed beside its rotation.
     """
 
     bone: str
@@ -65,21 +66,21 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     rig = _Rig(armature, evaluated)
     body = _body_control(rig, mapping)
     parts = {body: BODY}
-    found: list[tuple[str, str, bool]] = [(body, BODY, True)]
+    chosen: list[tuple[str, str, bool]] = [(body, BODY, True)]
     for side in "lr":
         named = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
         names = named if named[2] else named[:2]
         if all(names) and len(set(names)) == len(names):
             leg = _leg_controls(rig, side, names, body)
             if leg:
-                found += leg
+                chosen += leg
                 parts |= {bone: part for bone, part, _ in leg}
         arm = _arm_control(rig, mapping, side)
         if arm and arm not in parts:
-            found.append((arm, f"arm_{side}", False))
+            chosen.append((arm, f"arm_{side}", False))
             parts[arm] = f"arm_{side}"
     controls = []
-    for bone, part, moves in found:
+    for bone, part, moves in chosen:
         above = (ancestor for ancestor in rig.behind(bone) if ancestor != bone and ancestor in parts)
         controls.append(Control(bone, part, parts.get(next(above, ""), ""), moves))
     return controls
@@ -117,7 +118,7 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
 
 
 def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tuple[str, str, bool]]:
-    """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown.
+    """Bone, part, and True if it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown.
 
     In game rigs, whose IK was baked, feet often hang on the root: such a bone does not go where the shank takes it.
     Legs of thigh and shin alone have no bone for the foot, and IK does not turn it.
@@ -159,7 +160,7 @@ def _arm_control(rig: _Rig, mapping: RigMapping, side: str) -> str:
 
 
 class _Rig:
-    """An armature's bones as a graph of what follows what."""
+    """An armature's bones as a graph: each follows others."""
 
     def __init__(self, armature: bpy.types.Object, evaluated: bpy.types.Object) -> None:
         self.armature, self.name = armature, armature.name
@@ -207,36 +208,33 @@ class _Rig:
         return {bone for target, bone in aims if target == self.armature and bone in self._bones}
 
     def is_placed(self, bone: str) -> bool:
-        """Whether the bone's location alone says where it is in its armature."""
-        pose_bone = self._bones[bone]
-        top = pose_bone.parent is None and pose_bone.bone.use_local_location and not pose_bone.constraints
-        return top and not any(pose_bone.lock_location)
+        """True if no other bone of the rig moves the bone."""
+        return self._bones[bone].parent is None and not self._active(bone)
 
     def control_behind(self, bone: str, trunk: set[str]) -> str | None:
         """The nearest bone behind another, off the trunk, that an animator keys; else the nearest with a shape."""
         candidates = [name for name in self.behind(bone) if name not in trunk and self.is_free(name)]
         for kind in (self.keyed.__contains__, self.is_shaped, lambda _: True):
-            found = next((name for name in candidates if kind(name)), None)
-            if found is not None:
-                return found
+            control = next((name for name in candidates if kind(name)), None)
+            if control is not None:
+                return control
         return None
 
     def is_shaped(self, bone: str) -> bool:
-        """Whether the rig shows the bone as a control."""
+        """True if the rig shows the bone as a control."""
         return not self._shapes or self._bones[bone].custom_shape is not None
 
     def is_free(self, bone: str) -> bool:
-        """Whether nothing overrides the bone's keys."""
+        """True if nothing overrides the bone's keys."""
         return not any(
             constraint.type in ("COPY_TRANSFORMS", "ARMATURE", "COPY_ROTATION", "COPY_LOCATION", "IK", "DAMPED_TRACK")
             for constraint in self._active(bone)
         )
 
     def can_move(self, bone: str) -> bool:
-        """Whether the bone's location counts."""
+        """True unless the bone is connected: Blender keeps it at its parent's tail then, constraints or not."""
         pose_bone = self._bones[bone]
-        connected = pose_bone.bone.use_connect and pose_bone.parent is not None
-        return not connected and not all(pose_bone.lock_location)
+        return not (pose_bone.bone.use_connect and pose_bone.parent)
 
     def _followed(self, bone: str) -> list[str]:
         sources: list[str] = []
@@ -252,11 +250,10 @@ class _Rig:
 
     def _active(self, bone: str) -> list[Any]:
         """The bone's constraints that act now and refer to bones of this armature, as far as they refer to anything."""
-        own = self._bones[bone].constraints
-        seen = self._evaluated[bone].constraints
+        seen: Any = self._evaluated.get(bone, self._bones[bone]).constraints  # which may be renamed since
         return [
             c
-            for c, now in zip(own, seen, strict=True)
-            if not c.mute and c.enabled and now.influence > _FOLLOWED
+            for c in self._bones[bone].constraints
+            if not c.mute and c.enabled and seen.get(c.name, c).influence > _FOLLOWED and not is_own(c)
             if getattr(c, "target", None) in (None, self.armature) or c.type == "IK"
         ]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..numerics.rigid import rotation
-from .captured import MOST_FRAMES_PER_SECOND
+from .captured import check_length
 from .joint_centres import CapturedBody
 
 Array = NDArray[np.float64]
@@ -59,8 +59,8 @@ _POINTS = tuple(
 """Points of the feet that move with a joint: name, joint, and where they are from it at rest [m]."""
 
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
-_LARGEST = 2**31
-"""Size of what an archive holds [bytes]."""
+_LARGEST = 2**29
+"""Size of an array in the archive [bytes]; 100,000 poses are 130 MB."""
 
 
 def read(content: bytes) -> CapturedBody:
@@ -78,10 +78,11 @@ def read(content: bytes) -> CapturedBody:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            if sum(member.file_size for member in archive.infolist()) > _LARGEST:
-                raise InputError("the archive unpacks to more than 2 GB: it is not an AMASS file")
+            if any(member.file_size > _LARGEST for member in archive.infolist()):
+                raise InputError("the archive holds arrays of more than 500 MB: it is not an AMASS file")
         with np.load(io.BytesIO(content), allow_pickle=False) as held:
-            poses, way, rate = _poses(held), np.asarray(held["trans"], float), _rate(held)
+            rate = next((float(held[name]) for name in _RATES if name in held), np.nan)
+            poses, way = _poses(held, rate), _table(held["trans"], rate, 3)
     except InputError:
         raise
     except Exception as error:  # NumPy and zlib raise of every kind at damaged archives
@@ -91,22 +92,20 @@ def read(content: bytes) -> CapturedBody:
     return CapturedBody(_joints(poses, way), rate)
 
 
-def _poses(held: Any) -> Array:
+def _poses(held: Any, rate: float) -> Array:
     """Rotation vectors of the body's joints, (F, 22, 3) [rad]."""
-    if "poses" in held:
-        poses = np.asarray(held["poses"], float)
-    else:
-        poses = np.concatenate([np.asarray(held[name], float) for name in ("root_orient", "pose_body")], axis=1)
-    if poses.ndim != 2 or poses.shape[1] < 3 * len(_TREE) or not len(poses):
+    values = 3 * len(_TREE)
+    parts = ["poses"] if "poses" in held else ["root_orient", "pose_body"]
+    poses = np.concatenate([_table(held[part], rate, values) for part in parts], axis=1)
+    if poses.shape[1] < values or not len(poses):
         raise InputError(f"the AMASS file has poses of shape {poses.shape}: (frames, 66 or more) are needed")
-    return poses[:, : 3 * len(_TREE)].reshape(len(poses), -1, 3)
+    return poses[:, :values].reshape(len(poses), -1, 3)
 
 
-def _rate(held: Any) -> float:
-    rate = next((float(held[name]) for name in _RATES if name in held), np.nan)
-    if not 0 < rate <= MOST_FRAMES_PER_SECOND:
-        raise InputError("the AMASS file has no frame rate (mocap_framerate): save it with one")
-    return rate
+def _table(held: Any, rate: float, columns: int) -> Array:
+    """The first columns of an array with a row for each frame."""
+    check_length(len(held), rate)
+    return np.asarray(held[:, :columns], float)
 
 
 def _joints(poses: Array, way: Array) -> dict[str, Array]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .c3d_parameters import Parameters
-from .captured import Capture, metres
+from .captured import Capture, check_length, metres
 from .plates import plates_of
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ _INTEL, _DEC, _SGI = 84, 85, 86
 
 @dataclass(frozen=True)
 class _Numbers:
-    """How a family of processors writes numbers."""
+    """Number format of a family of processors."""
 
     processor: int
 
@@ -42,7 +42,7 @@ class _Numbers:
 
     def reals(self, content: bytes) -> Array:
         if self.processor != _DEC:
-            with np.errstate(invalid="ignore"):  # damaged numbers are told apart later
+            with np.errstate(invalid="ignore"):  # damaged numbers are recognised later
                 return np.frombuffer(content, f"{self.order}f4").astype(float)
         # VAX F-float: the halves of an IEEE number in turn, its exponent greater by two.
         halves = np.frombuffer(content, "<u2").reshape(-1, 2)
@@ -68,14 +68,6 @@ def read(content: bytes) -> Capture:
         raise InputError(f"the C3D file is damaged ({error}): export it again") from error
 
 
-def parameters_of(content: bytes) -> Parameters:
-    """The parameters alone, such as the subject's mass; errors as `read`."""
-    try:
-        return _parameters(content)[0]
-    except (struct.error, ValueError, IndexError, OverflowError) as error:
-        raise InputError(f"the C3D file is damaged ({error}): export it again") from error
-
-
 def _read(content: bytes) -> Capture:
     parameters, numbers = _parameters(content)
     layout = _Layout.of(content, parameters, numbers)
@@ -94,7 +86,7 @@ def _read(content: bytes) -> Capture:
 
 
 def _parameters(content: bytes) -> tuple[Parameters, _Numbers]:
-    """The parameter section, and how numbers are written in the file."""
+    """The parameter section, and the number format of the file."""
     if len(content) < 2 * _BLOCK or content[1] != _KEY:
         raise InputError("this is not a C3D file: it lacks the mark of one in its second byte")
     start = (content[0] - 1) * _BLOCK
@@ -147,7 +139,7 @@ def _value(content: bytes, place: int, numbers: _Numbers) -> Any:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the frames are and what each holds."""
+    """Position and content of the frames."""
 
     points: int
     channels: int
@@ -156,7 +148,7 @@ class _Layout:
     first: int
     frames: int
     scale: float
-    """Of whole numbers [the file's unit]; negative where the file holds reals."""
+    """Scale of whole numbers [the file's unit]; negative where the file holds reals."""
     start: int
     rate: float
 
@@ -202,6 +194,7 @@ def _frames(content: bytes, layout: _Layout, numbers: _Numbers) -> tuple[Array, 
             f"the C3D file is cut short: {layout.frames} frames of {values * width} bytes should follow, "
             f"{max(len(section), 0)} bytes do; copy or export it again"
         )
+    check_length(layout.frames, layout.rate)
     table = (numbers.reals(section) if real else numbers.integers(section)).reshape(layout.frames, values)
     points = table[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
     seen = (points[..., 3:] >= 0) & np.isfinite(points).all(axis=-1, keepdims=True)

@@ -23,8 +23,8 @@ class Parameters:
     def texts(self, group: str, name: str) -> list[str]:
         """All texts of a parameter, with those of the ones that continue it."""
         names = [name, *(f"{name}{number}" for number in range(2, _LONGEST_LABEL_LIST))]
-        found = (self.values.get((group, each), []) for each in names)
-        return [text for value in found if isinstance(value, list) for text in value]
+        values = (self.values.get((group, each), []) for each in names)
+        return [text for value in values if isinstance(value, list) for text in value]
 
     def text(self, group: str, name: str, missing: str = "") -> str:
         """The first text of a parameter."""

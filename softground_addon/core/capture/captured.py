@@ -1,4 +1,4 @@
-"""What a capture file holds, whatever its format: the paths of markers, and the force on each plate."""
+"""Content of a capture file, whatever its format: the paths of markers, and the force on each plate."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ Array = NDArray[np.float64]
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0}
 """Units that markers come in [m]."""
 
-MOST_FRAMES_PER_SECOND = 1e5
-"""Beyond it a frame rate is none [Hz]."""
+RATES = (1.0, 1e4)
+"""Lowest and highest frame rate of a camera [Hz]; others are damage."""
+
+MOST_FRAMES = 100_000
+"""Frames of a file at most: the rig takes 2 GB of memory then, a bake 6 GB."""
 
 
 @dataclass(frozen=True)
 class Plate:
-    """What a force plate measured, in the laboratory's axes.
+    """Measurements of a force plate, in the laboratory's axes.
 
     Attributes
     ----------
@@ -46,16 +49,11 @@ class Plate:
         return np.asarray(across / np.linalg.norm(across))
 
     def centre_of_pressure(self) -> Array:
-        """Where on the surface the force acts, (S, 3) [m]; NaN where nothing presses."""
+        """Point of the surface at which the force acts, (S, 3) [m]; NaN where nothing presses."""
         pressing = self.force @ self.normal
         with np.errstate(divide="ignore", invalid="ignore"):
             arm = np.cross(self.normal, self.moment) / pressing[:, None]
         return np.asarray(self.corners.mean(axis=0) + np.where(np.isfinite(arm), arm, np.nan))
-
-    def free_moment(self) -> Array:
-        """Moment about the normal at the centre of pressure, (S,) [N·m]; NaN where nothing presses."""
-        arm = self.centre_of_pressure() - self.corners.mean(axis=0)
-        return np.asarray((self.moment - np.cross(arm, self.force)) @ self.normal)
 
 
 @dataclass(frozen=True)
@@ -84,8 +82,19 @@ class Capture:
     def __post_init__(self) -> None:
         if not self.labels or not len(self.points):
             raise InputError("the file holds no markers: record or export it with its trajectories")
-        if not (np.isfinite(self.rate) and 0 < self.rate <= MOST_FRAMES_PER_SECOND):
-            raise InputError(f"the file has a frame rate of {self.rate:g} Hz: export it again with its frame rate")
+
+
+def check_length(frames: int, rate: float) -> None:
+    """Raise InputError for more frames than `MOST_FRAMES`, or a rate [Hz] beyond `RATES`; before arrays are made."""
+    low, high = RATES
+    if not low <= rate <= high:
+        raise InputError(
+            f"the file has a frame rate of {rate:g} Hz, not {low:g} to {high:,.0f}: export it again with it"
+        )
+    if frames > MOST_FRAMES:
+        raise InputError(
+            f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export a part of it, or fewer frames per second"
+        )
 
 
 def bridged(path: Array) -> Array:

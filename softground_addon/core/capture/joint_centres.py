@@ -1,4 +1,4 @@
-"""From markers on the skin to the centres of the joints, upright: Z up, metres.
+"""Centres of the joints from markers on the skin, upright: Z up, metres.
 
 References
 ----------
@@ -23,11 +23,11 @@ from .marker_sets import places_of
 Array = NDArray[np.float64]
 
 _HALF_WIDTHS = {"knee": 0.065, "ankle": 0.046, "elbow": 0.045, "wrist": 0.032}
-"""From a marker on a joint's outer side to its centre, in leg lengths: 58, 41, 41 and 29 mm for an adult."""
+"""Distance of a marker on a joint's outer side from its centre, in leg lengths: 58, 41, 41 and 29 mm for an adult."""
 _BELOW_ACROMION = 0.104
 """The shoulder's centre on the way from acromion to elbow (de Leva 1996)."""
 _TOE_BEYOND_BALL = 0.37
-"""From the ball to the tip of the toes, where there is no marker, over the distance from heel to ball."""
+"""Distance from the ball to the tip of the toes without a marker, over that from heel to ball."""
 _TIP_BEYOND_FIFTH = 1.25
 """A marker called "toe" is at the tip when it is so many times as far from the heel as the joints of the toes are."""
 

@@ -1,4 +1,4 @@
-"""Which place of the body each marker is on, by the names that laboratories give them.
+"""Place of each marker on the body, by the names that laboratories give them.
 
 The words are those of Plug-in Gait and CGM2 (Vicon), the OpenSim models of Delp and of Rajagopal, OpenCap, the
 anatomical names of Qualisys and the ISB, and the joint centres of markerless capture (Theia, Pose2Sim, OpenPose).
@@ -79,7 +79,7 @@ def places_of(labels: Sequence[str]) -> dict[str, list[int]]:
 
 
 def _marks_skin(labels: Sequence[str]) -> bool:
-    """Whether markers are glued to the skin: then a plain "knee" is on its outer side and no joint centre."""
+    """True if markers are glued to the skin: then a plain "knee" is on its outer side and no joint centre."""
     return any((_place(label, on_skin=False) or "").startswith(("asis", "psis", "knee inner")) for label in labels)
 
 

@@ -41,7 +41,8 @@ def plates_of(analog: Array, rate: float, parameters: Parameters, unit: float) -
     calibrations = parameters.array("FORCE_PLATFORM", "CAL_MATRIX")
     units = parameters.texts("ANALOG", "UNITS")
     plates = []
-    for index in range(min(used, len(types), corners.size // 12, origins.size // 3) if channels.size else 0):
+    most = analog.shape[1] // min(_CHANNELS.values())  # each has channels of its own
+    for index in range(min(used, len(types), corners.size // 12, origins.size // 3, most) if channels.size else 0):
         kind = int(types[index])
         count = _CHANNELS.get(kind, 0)
         wanted = channels.reshape(-1, used, order="F")[:count, index].astype(int) - 1

@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 _FLOOR_IS_ZERO = (-0.05, 0.15)
 """Heights of the lowest markers in leg lengths at which the laboratory's floor is where its axes begin."""
 _MARKER_ABOVE_SOLE = 0.03
-"""Of a marker on the shoe, in leg lengths, where the floor has to be guessed."""
+"""Height of a marker on the shoe, in leg lengths, where the floor has to be guessed."""
 _LOW = 5.0
 """Percentile of heights at which a foot stands."""
 _HEAD = 0.35
-"""Length of the head over that of the trunk, where no bone tells it."""
+"""Length of the head over that of the trunk, where no bone shows it."""
 _SHOULDER = 0.35
-"""From the neck to a shoulder at rest, over the length of the trunk."""
+"""Distance from the neck to a shoulder at rest, over the length of the trunk."""
 _HAND = 0.4
 """Length of the hand over that of the forearm."""
 
@@ -76,7 +76,7 @@ class Skeleton:
         return np.stack([_matrix(bone.head, bone.tail - bone.head, bone.x_axis) for bone in self.bones])
 
     def channels(self) -> Array:
-        """What Blender keys: each bone's pose relative to its rest and its parent, (F, B, 4, 4)."""
+        """Poses as Blender keys them: each bone's, relative to its rest and its parent, (F, B, 4, 4)."""
         rest, parents = self.rest(), [self._index(bone.parent) for bone in self.bones]
         channels = np.empty_like(self.poses)
         for index, parent in enumerate(parents):
@@ -151,11 +151,11 @@ def _segments(joints: dict[str, Array]) -> list[tuple[str, str, str, str]]:
         )
     ]
     head = [("Head", "Neck", "head", "top")]
-    found: list[tuple[str, str, str, str]] = []
+    segments: list[tuple[str, str, str, str]] = []
     for name, parent, start, end in trunk + head + limbs:
-        if start in joints and end in joints and (not parent or any(bone[0] == parent for bone in found)):
-            found.append((name, parent, start, end))
-    return found
+        if start in joints and end in joints and (not parent or any(bone[0] == parent for bone in segments)):
+            segments.append((name, parent, start, end))
+    return segments
 
 
 def standing(body: CapturedBody) -> dict[str, Array]:

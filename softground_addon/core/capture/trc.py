@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from .captured import Capture, metres
+from .captured import Capture, check_length, metres
 
 _HEADER_LINES = 5
-_MOST_MARKERS = 100_000
+_SPARSE = 10_000_000
+"""Values up to which a table may have more of them than the file has bytes: lines may end before markers not seen."""
 
 
 def read(content: bytes) -> Capture:
@@ -29,32 +30,29 @@ def read(content: bytes) -> Capture:
         raise InputError('this is no TRC file: its first line lacks "PathFileType"')
     about = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [name.strip() for name in lines[3].split("\t")[2:] if name.strip()]
-    if not 0 < len(labels) < _MOST_MARKERS:
+    if not labels:
         raise InputError("the TRC file names no markers in its fourth line: export it again")
     rows = [line for line in lines[_HEADER_LINES:] if line.strip()]
-    table = np.array([_numbers(row, 2 + 3 * len(labels)) for row in rows]).reshape(-1, 2 + 3 * len(labels))
-    promised = about.get("NumFrames", "")
-    if promised.isdigit() and len(table) < int(promised):
+    promised, rate = (_number(about.get(what, "")) for what in ("NumFrames", "DataRate"))
+    if len(rows) < promised:
         raise InputError(
-            f"the TRC file is cut short: it holds {len(table)} of {promised} frames; copy or export it again"
+            f"the TRC file is cut short: it holds {len(rows)} of {promised:.0f} frames; copy or export it again"
         )
-    try:
-        rate = float(about["DataRate"])
-    except (KeyError, ValueError):
-        raise InputError("the TRC file has no data rate in its third line: export it again") from None
+    check_length(len(rows), rate)
+    width = 2 + 3 * len(labels)
+    if len(rows) * width > max(len(content), _SPARSE):
+        raise InputError(f"the TRC file names {len(labels):,} markers and holds far fewer: export it again")
+    table = np.full((len(rows), width), np.nan)
+    for values, row in zip(table, rows, strict=True):
+        cells = (row.split("\t") if "\t" in row else row.split())[:width]
+        values[: len(cells)] = [_number(cell) for cell in cells]
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres(about.get("Units", "mm"))
     first = table[0, 0] if len(table) and np.isfinite(table[0, 0]) else 1
     return Capture(tuple(labels), points, rate, int(np.clip(first, 0, 2**31 - 1)))
 
 
-def _numbers(row: str, count: int) -> list[float]:
-    """The numbers of a line; what is empty or no number is a marker that was not seen."""
-    cells = row.split("\t") if "\t" in row else row.split()
-    values = [_number(cell) for cell in cells[:count]]
-    return values + [np.nan] * (count - len(values))
-
-
 def _number(cell: str) -> float:
+    """The number of a cell, NaN where it is empty or none: a marker that was not seen."""
     try:
         value = float(cell)
     except ValueError:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
-from ..motion.motion import SolePatch
+from ..motion.sole_motion import SolePatch
 from ..numerics.rigid import inverse, rotation, turn_between, unit
 from ..record.contact_steps import PressingSole, Steps
 from ..record.edits import StepEdit

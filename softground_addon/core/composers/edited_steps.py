@@ -9,22 +9,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.heightfield import HeightField, Window
+from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import Window
 from ..numerics.cell_keys import ROW, Keys, among
+from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
-from ..pressing.ground_cells import Imprints, Timing, UndisturbedCells
+from ..pressing.ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
 from ..pressing.sole_layout import SoleLayout
 from ..pressing.sole_points import SolePoints, sole_points
 from ..pressing.solver import GroundSolver
-from ..record.contact_steps import PressingSole, Steps
+from ..record.contact_steps import Steps
 from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from ..record.footprints import QUANTUM, Changes, Footprint
 from ..record.mesh_sole import MeshSole
@@ -48,7 +51,10 @@ SLIDING = 0.25
 """How far around a step ground may slide into it, where the material has an angle of repose [m]."""
 
 
-def with_edits(left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float) -> BakeRecord:
+@sliced
+def with_edits(
+    left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float
+) -> Slices[BakeRecord]:
     """A record with other edits in place of those that it has.
 
     Parameters
@@ -65,7 +71,7 @@ def with_edits(left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGrou
     InputError
         See `EditedSteps.pressed_again`.
     """
-    return EditedSteps(left.footprints, ground, cell_size).left_with(left, edits)
+    return (yield from EditedSteps.left_with.slices(EditedSteps(left.footprints, ground, cell_size), left, edits))
 
 
 class EditedSteps:
@@ -84,30 +90,30 @@ class EditedSteps:
     def __init__(self, footprints: Sequence[Footprint], ground: SoftGround, cell_size: float) -> None:
         self._footprints, self._ground, self._cell_size = footprints, ground, cell_size
         self._undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
-        self._solver = GroundSolver(ground, HeightField(cell_size), self._undisturbed)
+        self._cells = GroundCells(ground, self._undisturbed)
         self._weather_reach = int(ground.weathering.reach / cell_size) if ground.weathering else 0
         """How many cells around a step what weather leaves there depends on."""
         sliding = int(SLIDING / cell_size) if ground.material.repose_angle else 0
         self._margin = max(sliding, self._weather_reach)
-        self._points: dict[int, SolePoints] = {}
         self._feet = feet(footprints)
-        self._meshes: dict[MeshSole, PressingSole] = {}
-        self._scaled: dict[tuple[int, float], PressingSole] = {}
+        self._points: dict[tuple[int | MeshSole, float], SolePoints] = {}
+        """Of soles and their scales."""
         self._layouts: dict[Change, _Layout] = {}
         """Of the group that was pressed last: they take memory."""
         self._unpacked: dict[int, _Baked] = {}
         """Prints around the steps that were pressed last, which a step that is dragged meets again and again."""
         self._known: dict[frozenset[Change], _Group] = {}
-        self._met: dict[frozenset[frozenset[Change]], bool] = {}
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
         self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
 
-    def left_with(self, left: BakeRecord, edits: Mapping[str, StepEdit]) -> BakeRecord:
+    @sliced
+    def left_with(self, left: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
         """The record that the footprints are of, with other edits; errors as `pressed_again`."""
-        again = self.pressed_again(edits_by_number(left.footprints, edits))
+        again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(left.footprints, edits))
         return replace(left, edits=dict(edits), pressed_again=again)
 
-    def pressed_again(self, edits: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+    @sliced
+    def pressed_again(self, edits: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
         """What stands for some of the footprints.
 
         Parameters
@@ -127,12 +133,13 @@ class EditedSteps:
         """
         count = len(self._footprints)
         edits = {number: edit for number, edit in edits.items() if edit != UNCHANGED or number >= count}
-        groups = [self._group(frozenset({change})) for change in sorted(edits.items(), key=lambda item: item[0])]
+        groups = []
+        for change in sorted(edits.items(), key=lambda item: item[0]):
+            groups.append((yield from self._group(frozenset({change}))))
         while pair := next((pair for pair in _near(groups) if self._meet(*pair)), None):
             groups = [group for group in groups if group not in pair]
-            groups.append(self._group(pair[0].edits | pair[1].edits))
+            groups.append((yield from self._group(pair[0].edits | pair[1].edits)))
         self._known = {changes: group for changes, group in self._known.items() if _within(changes, edits)}
-        self._met = {pair: met for pair, met in self._met.items() if pair <= self._known.keys()}
         return dict(sorted(item for group in groups for item in group.prints.items()))
 
     def _baked(self, number: int) -> Footprint:
@@ -143,22 +150,21 @@ class EditedSteps:
         """The print that a bake without edits has."""
         return self._footprints[number] if number < len(self._footprints) else None
 
-    def _group(self, edits: frozenset[Change]) -> _Group:
+    def _group(self, edits: frozenset[Change]) -> Slices[_Group]:
         """Steps that were edited, and those that meet them."""
         if edits not in self._known:
             try:
-                with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                    self._known[edits] = self._pressed(edits)
+                self._known[edits] = yield from without_warnings(self._pressed(edits))
             except _DAMAGE as error:
                 raise InputError(
                     f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
                 ) from None
         return self._known[edits]
 
-    def _pressed(self, edits: frozenset[Change]) -> _Group:
+    def _pressed(self, edits: frozenset[Change]) -> Slices[_Group]:
         members = dict(edits)
         while True:
-            prints = self._press(members)
+            prints = yield from self._press(members)
             changed = {n: self._changed_cells(n, footprint) for n, footprint in prints.items()}
             later = {
                 other
@@ -172,7 +178,7 @@ class EditedSteps:
         self._layouts = {change: self._layouts[change] for change in members.items() if change in self._layouts}
         kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
         windows = [footprint.window for footprint in kept.values() if footprint]
-        window = _union([*windows, *(self._baked(n).window for n in kept)])
+        window = reduce(Window.union, [*windows, *(self._baked(n).window for n in kept)])
         return _Group(edits, kept, {n: changed[n] for n in kept}, window.expanded(self._weather_reach))
 
     def _start(self, number: int, edit: StepEdit) -> float:
@@ -180,11 +186,10 @@ class EditedSteps:
         return self._baked(number).start_frame + min(0, edit.shift_frames)
 
     def _meet(self, one: _Group, other: _Group) -> bool:
-        """Whether steps of one group meet what another one changed."""
-        pair = frozenset({one.edits, other.edits})
-        if pair not in self._met:
-            self._met[pair] = bool(one.prints.keys() & other.prints.keys()) or self._touch(one, other)
-        return self._met[pair]
+        """True if steps of one group meet what another one changed."""
+        if other not in one.meets:
+            one.meets[other] = bool(one.prints.keys() & other.prints.keys()) or self._touch(one, other)
+        return one.meets[other]
 
     def _touch(self, one: _Group, other: _Group) -> bool:
         return any(
@@ -238,55 +243,46 @@ class EditedSteps:
                     differs[window.slices(one.window)] |= _changed_by(one)
         return _keys(window, np.flatnonzero(differs))
 
-    def _press(self, members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+    def _press(self, members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
         """The prints of some steps, on what all others leave."""
         moving = {n: edit for n, edit in sorted(members.items()) if not edit.mute}
         layouts = {change[0]: self._layout(change) for change in moving.items()}
         prints: dict[int, Footprint | None] = dict.fromkeys(sorted(members))
         if layouts:
-            prints |= self._run(layouts, members)
+            prints |= yield from self._run(layouts, members)
         return prints
 
-    def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+    def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
         layouts = {n: one.layout for n, one in laid.items()}
         grid = _grid(self._baked(next(iter(layouts))))
         start = min(layout.first for layout in layouts.values())
         end = max(layout.end for layout in layouts.values())
         others = self._others(layouts, members, grid.frame(grid.number(end - 1)))
         first = grid.number(start)
-        self._solver = GroundSolver(self._ground, HeightField(self._cell_size), self._undisturbed)
-        weathered = self._solver.weathered
-        for other in others:
-            _add(self._solver.state, other.until(grid.frame(first - 1)))
-        if weathered:
+        solver = GroundSolver(self._ground, HeightField(self._cell_size), self._undisturbed)
+        if weathered := solver.weathered:
             for one in self._footprints:
                 weathered.ended(one.end_frame, one.compressed_m3, one.area_m2)
-            for other in others:
-                weathered.press(*other.pressed(-np.inf, grid.frame(first - 1)))
-        contacts = {n: OpenContact(one.layout, laid_out=one.imprints) for n, one in laid.items()}
+        contacts = [OpenContact(one.layout, laid_out=one.imprints) for one in laid.values()]
+        number_of = dict(zip(contacts, laid, strict=True))
         prints: dict[int, Footprint | None] = {}
-        for number in range(first, grid.number(end - 1) + 1):
+        before = -np.inf
+        for number in range(first - 1, grid.number(end - 1) + 1):
+            yield
             frame, steps = grid.frame(number), grid.steps(number)
             for other in others:
-                _add(self._solver.state, other.at(frame))
-                if weathered:
-                    weathered.note(*other.known(frame))
-                    weathered.press(*other.pressed(grid.frame(number - 1), frame))
-            under_way = [
-                one for one in contacts.values() if one.layout.first < steps.stop and one.layout.end > steps.start
-            ]
-            self._solver.advance(under_way, steps.start, steps.stop, frame, grid.timing)
-            for n, contact in contacts.items():
-                if contact in under_way and contact.layout.end <= steps.stop:
-                    self._solver.settle(contact, frame)
-                    prints[n] = contact.footprint() if contact.recorder else None
+                other.replay(solver, before, frame)
+            before = frame
+            _, ended = solver.step(contacts, steps.start, steps.stop, frame, grid.timing)
+            for contact in ended:
+                prints[number_of[contact]] = contact.footprint() if contact.recorder else None
         return prints
 
     def _others(
         self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit], end: float
     ) -> list[_Baked]:
         """The prints around some steps that stay as they were baked."""
-        windows = [layout.window(self._solver.cells).expanded(self._margin) for layout in layouts.values()]
+        windows = [layout.window(self._cells).expanded(self._margin) for layout in layouts.values()]
         low, size = self._windows[:, :2], self._windows[:, 2:]
         near = np.zeros(len(low), bool)
         for column, row, columns, rows in windows:
@@ -307,38 +303,27 @@ class EditedSteps:
         if kept is None:
             raise InputError(
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
-                "baked by an earlier version of SoftGround, or by a mesh of too many vertices, and can only be muted: "
-                "bake again, or give the mesh fewer vertices."
+                "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again."
             )
         steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
-        other = self._shared(sole_of(edit, kept.pressing, self._feet), edit)
+        other = sole_of(edit, kept.pressing, self._feet)
         pressing, steps = edited_contact(kept.pressing, steps, other, edit, footprint.position, self._ground.terrain)
-        if pressing is not other:  # scaled, of which there is one
-            pressing = self._scaled.setdefault((id(other), edit.scale), pressing)
         sole, strength = pressing.sole, edit.strength
         layout: ContactLayout
         if sole.prop is not None:
             layout = PropLayout(footprint.character, sole, steps, strength=strength)
         else:
-            layout = SoleLayout(footprint.character, sole, steps, self._points_of(pressing), strength=strength)
+            key = edit.mesh if edit.mesh and other is edit.mesh.pressing else id(other), edit.scale
+            if key not in self._points:
+                self._points[key] = sole_points(sole, pressing.flat[None])
+            layout = SoleLayout(footprint.character, sole, steps, self._points[key], strength=strength)
         most = max(MOST_CELLS, MOST_PRINTS * footprint.window.cells) * max(1.0, edit.scale**2)
-        if layout.window(self._solver.cells).cells > most:
+        if layout.window(self._cells).cells > most:
             raise InputError(
                 f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
                 f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
             )
         return layout
-
-    def _shared(self, pressing: PressingSole, edit: StepEdit) -> PressingSole:
-        """A sole, of a mesh the one that all edits with it share."""
-        if edit.mesh is None or pressing is not edit.mesh.pressing:
-            return pressing
-        return self._meshes.setdefault(edit.mesh, pressing)
-
-    def _points_of(self, pressing: PressingSole) -> SolePoints:
-        if id(pressing) not in self._points:
-            self._points[id(pressing)] = sole_points(pressing.sole, pressing.flat[None])
-        return self._points[id(pressing)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,12 +336,14 @@ class _Layout:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Steps that were edited, with those that meet them, the cells that each changed visibly, and their window."""
+    """Steps that were edited, with those that meet them, the cells that each changed visibly, their window, and which
+    other groups meet them, as far as that was asked."""
 
     edits: frozenset[Change]
     prints: dict[int, Footprint | None]
     changed: dict[int, Keys]
     window: Window
+    meets: WeakKeyDictionary[_Group, bool] = field(default_factory=WeakKeyDictionary)
 
 
 @dataclass(frozen=True)
@@ -428,26 +415,18 @@ class _Baked:
         both = (self._footprint.compression, self._footprint.rim)
         return [(one.frames, one.first, one.cells, one.amounts) for one in both]
 
-    def until(self, frame: float) -> tuple[Window, Array] | None:
-        """All that it changed up to a recorded frame."""
-        return self._sum([slice(0, int(np.searchsorted(frames, frame + 1e-6))) for frames, *_ in self._changes])
+    def replay(self, solver: GroundSolver, since: float, frame: float) -> None:
+        """Change a ground as it did after one recorded frame, up to another."""
+        window = self._footprint.window
+        during = [slice(*np.searchsorted(frames, (since + 1e-6, frame + 1e-6))) for frames, *_ in self._changes]
+        if any(part.start < part.stop for part in during):
+            solver.state.write(window, solver.state.read(window) + self._sum(during))
+        if weathered := solver.weathered:
+            weathered.note(*self._known(frame))
+            after, before = (self._footprint.tile(self._pressing, one + 1e-6) for one in (frame, since))
+            weathered.press(window, after - before)
 
-    def at(self, frame: float) -> tuple[Window, Array] | None:
-        """What it changed in the recorded frame that ends at a frame."""
-        return self._sum(
-            [
-                slice(int(np.searchsorted(frames, frame - 1e-6)), int(np.searchsorted(frames, frame + 1e-6)))
-                for frames, *_ in self._changes
-            ]
-        )
-
-    def pressed(self, since: float, frame: float) -> tuple[Window, Array]:
-        """What it compressed itself from one recorded frame to another, as `WeatheredCells.press` takes it."""
-        both = (self._footprint.tile(self._pressing, one + 1e-6) for one in (frame, since))
-        after, before = both
-        return self._footprint.window, after - before
-
-    def known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
+    def _known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
         """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""
         footprint, window = self._footprint, self._footprint.window
         last, touched = np.full(window.cells, -np.inf), np.zeros(window.cells, bool)
@@ -462,25 +441,14 @@ class _Baked:
         shape = (window.rows, window.columns)
         return window, last.reshape(shape), touched.reshape(shape)
 
-    def _sum(self, during: Sequence[slice]) -> tuple[Window, Array] | None:
-        if all(part.start == part.stop for part in during):
-            return None
+    def _sum(self, during: Sequence[slice]) -> Array:
+        """What it changed in some of its recorded frames, (2, rows, columns) [m]."""
         window = self._footprint.window
         sums = []
         for part, (_, first, cells, amounts) in zip(during, self._changes, strict=True):
             within = slice(first[part.start], first[part.stop])
             sums.append(np.bincount(cells[within], amounts[within], window.cells))
-        return window, np.stack(sums).reshape(2, window.rows, window.columns) * QUANTUM
-
-
-def _add(ground: HeightField, change: tuple[Window, Array] | None) -> None:
-    if change is not None:
-        ground.write(change[0], ground.read(change[0]) + change[1])
-
-
-def _union(windows: Iterable[Window]) -> Window:
-    """The smallest window that holds some others."""
-    return reduce(Window.union, windows)
+        return np.asarray(np.stack(sums).reshape(2, window.rows, window.columns) * QUANTUM)
 
 
 def _near(groups: Sequence[_Group]) -> Iterable[tuple[_Group, _Group]]:

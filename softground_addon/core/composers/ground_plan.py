@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.camera_view import FARTHEST, CameraView
 from ..ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
 from ..loads.contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
 from ..loads.missed_steps import advice, missed_steps
-from ..motion.motion import CharacterMotion, SoleMotion, shortest_length
+from ..motion.motion import CharacterMotion
 from ..motion.props import posed
+from ..motion.sole_motion import SoleMotion, shortest_length
 from ..numerics.cell_keys import Keys, cells_at, cells_of, keys_of
 from ..numerics.slices import Slices, sliced
 
@@ -105,6 +107,17 @@ class GroundPlan:
         row, column = np.mgrid[-int(far) : int(far) + 1, -int(far) : int(far) + 1]
         disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
         return cells_of(np.unique(cells_at(footfalls, side)[:, None] + disc)), level
+
+    def widened(self, margin: float, camera: CameraView | None) -> GroundPlan:
+        """The plan with a margin [m] on all sides, and over what a camera sees of it; without a margin as it is."""
+        if not margin > 0:
+            return self
+        corners = near = np.stack([self.lower - margin, self.upper + margin])
+        if camera is not None:
+            height = float(self.terrain.heights(*(self.lower + self.upper)[:, None] / 2)[0])
+            seen = np.clip(camera.reach(height), near[0] - FARTHEST, near[1] + FARTHEST)
+            corners = np.concatenate([near, seen])
+        return replace(self, lower=corners.min(axis=0), upper=corners.max(axis=0))
 
 
 def extent(motions: Sequence[CharacterMotion]) -> tuple[Array, Array]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import SparseGrid, Window
 from ..loads.estimate import CharacterLoads
 from ..numerics.intervals import runs
 from ..pressing.ground_cells import UndisturbedCells

@@ -1,47 +1,51 @@
-"""How deep a shot's prints will be, without pressing any cell: the typical one, and the deepest.
+"""Depth of the prints before a bake: its solver presses every contact of the shot, on cells as coarse as soles allow.
 
-What the material does not change is gathered once for each contact: how large it is at any sinkage, how high its
-underside is over the ground. Another material then follows all contacts at once, step by step, into the ground under
-their lowest points; those into which it gives way the furthest are followed under all of their soles.
+Contacts that turn out about as deep as the typical one are then pressed into whatever material is asked about.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.heightfield import Terrain
-from ..ground.material import GroundMaterial, Pressure
-from ..ground.variation import Variation
+from ..ground.heightfield import HeightField
+from ..ground.material import MATERIAL_RANGES, GroundMaterial, Pressure
+from ..ground.soft_ground import SoftGround
 from ..loads.estimate import CharacterLoads
 from ..numerics.slices import Slices, sliced
-from ..pressing.ground_cells import UndisturbedCells
-from ..pressing.prop_imprint import GroundUnder
-from ..record.typical_depth import main_contacts, median_depth
-from .resting_props import depth_under, prop_poses
-from .sinking_soles import ContactTable, SinkingSoles
-from .sole_contacts import NEVER_LANDS, SoleContact, sole_contacts, square_sizes
+from ..pressing.contact_layout import STEPS_AT_ONCE as STEPS_AHEAD
+from ..pressing.contact_layout import ContactLayout
+from ..pressing.ground_cells import Timing, UndisturbedCells
+from ..pressing.open_contact import OpenContact
+from ..pressing.solver import GroundSolver
+from ..record.footprints import Footprint
+from ..record.typical_depth import main_contacts, median_depth, typical_contacts
+from .simulation import ShotContact, contacts_of, time_grid
 
 Array = NDArray[np.float64]
 
-FEW = 6
-"""Contacts that are followed under all of their soles where an estimate will do, and poses of bodies."""
-TYPICAL = 24
-"""Contacts that tell the depth of the typical one."""
-FINEST_CELL = 1 / 240
-"""Finer cells tell no more of the depth, in lengths of the shortest sole: 1.1 mm for an adult."""
+CELLS_ALONG_SOLE = 60
+"""Finer cells show the same depths, to a hundredth."""
+MOST_STEPS = 320
+"""Steps that a longer contact is pressed in: 2.7 s, at the usual 120 a second."""
+SAMPLE = 11
+"""Contacts around the median that are pressed into another material, ..."""
+BENEATH = 11
+"""... and earlier ones, on which they tread."""
+STEPS_AT_ONCE, BODY_STEPS_AT_ONCE = 32, 1
+"""Steps of a foot and of a body that are pressed in a slice."""
 MATCH_TOLERANCE = 2e-3
 """Relative error of a matched depth."""
-FREE_TRIALS = 6
-"""Guesses of the modulus before it is searched by halving."""
-MOST_TRIALS = 60
-"""Halvings of the interval in which the modulus is searched: its logarithm is then known to rounding."""
-SOFTEST, STIFFEST = 1e3, 1e10
-"""Range in which a modulus is searched [Pa]."""
+FREE_TRIALS, MOST_TRIALS = 8, 40
+"""Moduli that are tried before their interval is halved, and in all."""
+LEAST_POWER, MOST_POWER = 0.1, 3.0
+"""Range of the power by which the depth falls with the modulus."""
+SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
 TAKES_NO_PRINT = (
     "No stiffness gives a print: the ground takes none under the feet. Check the masks, and the crust "
     "in Advanced > Layers."
@@ -49,145 +53,167 @@ TAKES_NO_PRINT = (
 
 
 @dataclass(frozen=True)
-class ContactLoads:
-    """Every contact of a shot, as the ground feels it.
+class _Contact:
+    """A contact of a shot, as it is laid out on coarse cells and steps, so many of them at once."""
+
+    source: ShotContact
+    layout: ContactLayout
+    timing: Timing
+    at_once: int
+    cells: UndisturbedCells
+
+    @property
+    def impulse(self) -> float:
+        """Force times time [N s]."""
+        return float(self.layout.force.sum()) * self.timing.step
+
+
+@dataclass(frozen=True, eq=False)
+class ShotContacts:
+    """Every contact of a shot, pressed once and to be pressed into other materials.
 
     Attributes
     ----------
-    soles : tuple of SoleContact
-        Those of the most steps first.
-    poses : tuple of (GroundUnder, float)
-        The ground under bodies at some steps, and the normal force at those [N]; the hardest first.
-    table : ContactTable or None
-        Of the soles, if there are any.
+    ground : SoftGround
+        Into which they were pressed.
+    contacts : tuple
+        Those of one character after those of another, as they come.
+    depths : (C,) float array
+        Depth of each print [m].
+    typical : float
+        Of the typical one [m]; see `record.typical_depth`.
+    sample, beneath : list of int
+        Contacts about as deep, and those on which they tread.
     """
 
-    soles: tuple[SoleContact, ...]
-    poses: tuple[tuple[GroundUnder, float], ...]
-    table: ContactTable | None
-
-    def deepest(self, material: GroundMaterial, pressure: Pressure = "UNIFORM", most: int | None = None) -> float:
-        """Depth of the deepest print [m], 0 if there is none.
-
-        Parameters
-        ----------
-        material : GroundMaterial
-        pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
-            Of soles; that of bodies follows from their shape.
-        most : int, optional
-            Look at so many contacts only, where the ground gives way the furthest, with as many that they lie on; and
-            at so many poses of bodies, which press the hardest.
-        """
-        depth = max((depth_under(under, force, material) for under, force in self.poses[:most]), default=0.0)
-        if self.table is None:
-            return depth
-        sinking = self.table.sink(material)
-        furthest = np.argsort(-sinking.reached, kind="stable")[:most]
-        furthest = furthest[sinking.reached[furthest] > 0]
-        if most is not None:
-            furthest = self.table.with_those_under(furthest, 2 * most)
-        return max(depth, float(_depths(self.table, furthest, sinking, material, pressure).max()))
-
-    def typical(self, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> float:
-        """Depth of the typical print [m]; see `typical_depth`."""
-        return typical_depth(self, material, pressure)
-
-    def modulus_for(self, material: GroundMaterial, share: float) -> float:
-        """The modulus [Pa] with which prints are about so many times as deep: by how far the ground gives way under
-        the lowest points alone, which is known at once."""
-        if (table := self.table) is None:
-            return material.youngs_modulus / share
-        main = main_contacts(table.impulse())
-
-        def reached(modulus: float) -> float:
-            return float(np.median(table.sink(replace(material, youngs_modulus=modulus)).reached[main]))
-
-        modulus = material.youngs_modulus
-        aim = share * reached(modulus)
-        for _ in range(FREE_TRIALS):
-            modulus = float(np.clip(modulus * reached(modulus) / max(aim, NEVER_LANDS), SOFTEST, STIFFEST))
-        return modulus
+    ground: SoftGround
+    contacts: tuple[_Contact, ...]
+    depths: Array
+    typical: float
+    sample: list[int]
+    beneath: list[int]
 
 
 @sliced
-def typical_depth(contacts: ContactLoads, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> Slices[float]:
-    """Depth of the typical print [m]; see `record.typical_depth`. Of bodies alone, that of the deepest.
-
-    Of many contacts, those are looked at into which the ground gives way about as far as into the median one.
-
-    Parameters
-    ----------
-    contacts : ContactLoads
-    material : GroundMaterial
-    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
-    """
-    if (table := contacts.table) is None:
-        return contacts.deepest(material, pressure, most=FEW)
-    sinking = table.sink(material)
-    main = np.flatnonzero(main_contacts(table.impulse()))
-    main = main[np.argsort(sinking.reached[main], kind="stable")]
-    beside = max(0, (len(main) - TYPICAL) // 2)
-    chosen = main[beside : len(main) - beside]
-    together = table.with_those_under(chosen, 2 * TYPICAL)
-    yield
-    depths = yield from table.pressing(together, sinking, material, pressure)
-    return median_depth(depths[chosen])
-
-
-@sliced
-def _depths(
-    table: ContactTable, chosen: NDArray[np.intp], sinking: SinkingSoles, material: GroundMaterial, pressure: Pressure
-) -> Slices[Array]:
-    return (yield from table.pressing(chosen, sinking, material, pressure))
-
-
-@sliced
-def contact_loads(
-    loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float, variation: Variation | None = None
-) -> Slices[ContactLoads]:
-    """Every contact of the characters.
+def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Slices[ShotContacts]:
+    """Every contact of the characters, pressed; each character treads on its own prints only, and no weather on them.
 
     Parameters
     ----------
     loads : sequence of CharacterLoads
-    terrain : Terrain
-        The undisturbed ground.
+    ground : SoftGround
     cell_size : float
-        Side of a cell [m]: the ground's height is looked up once per cell, or `FINEST_CELL`.
-    variation : Variation, optional
-        How the ground varies from place to place.
+        Side of a cell of the bake [m].
     """
-    shortest = min((sole.sole.length for one in loads for sole in one.motion.soles), default=0.0)
-    cell_size = max(cell_size, FINEST_CELL * shortest)
-    cells = UndisturbedCells(terrain, variation, cell_size)
-    of_size = {cell_size: cells}
-    soles: list[SoleContact] = []
-    poses: list[tuple[GroundUnder, float]] = []
-    sizes = square_sizes(loads, cell_size)
-    yield
-    for number, (character, size) in enumerate(zip(loads, sizes, strict=True)):
-        squares = of_size.setdefault(size, UndisturbedCells(terrain, None, size))
-        for index, sole in enumerate(character.motion.soles):
-            if sole.sole.prop:
-                for pose in prop_poses(character, index, cells):
-                    poses.append(pose)
-                    yield
-            else:
-                soles += yield from sole_contacts(character, number, index, cells, squares)
-    soles.sort(key=lambda contact: -len(contact.force))
-    poses.sort(key=lambda pose: -pose[1])
-    table = (yield from ContactTable.of(soles)) if soles else None
-    return ContactLoads(tuple(soles), tuple(poses), table)
+    contacts: list[_Contact] = []
+    for number, character in enumerate(loads):
+        cells = UndisturbedCells(ground.terrain, ground.variation, max(cell_size, _coarsest(character)))
+        contacts += sorted(_laid_out(character, number, cells), key=lambda contact: contact.source.first)
+        yield
+    return (yield from _sampled(contacts, replace(ground, weathering=None)))
 
 
+@sliced
+def pressed_again(contacts: ShotContacts, material: GroundMaterial, pressure: Pressure) -> Slices[ShotContacts]:
+    """The same contacts, all of them pressed into another material."""
+    ground = replace(contacts.ground, material=material, pressure=pressure)
+    return (yield from _sampled(contacts.contacts, ground))
+
+
+@sliced
+def typical_depth(contacts: ShotContacts, material: GroundMaterial, pressure: Pressure) -> Slices[float]:
+    """Depth of the typical print in a material [m], from the contacts that were about as deep in that of `contacts`."""
+    ground = replace(contacts.ground, material=material, pressure=pressure)
+    prints = yield from _press(contacts.contacts, sorted(contacts.sample + contacts.beneath), ground)
+    return median_depth(_depths(prints, len(contacts.contacts))[contacts.sample])
+
+
+def _coarsest(character: CharacterLoads) -> float:
+    """Side of the coarsest cells that show the feet of a character, or its bodies where it has none [m]."""
+    soles = [sole.sole for sole in character.motion.soles]
+    feet = [sole for sole in soles if sole.prop is None] or soles
+    return min(float(np.ptp(sole.outline, axis=0).max()) for sole in feet) / CELLS_ALONG_SOLE
+
+
+def _laid_out(character: CharacterLoads, number: int, cells: UndisturbedCells) -> Iterator[_Contact]:
+    """The contacts of a character of a number."""
+    grid, motion = time_grid([character]), character.motion
+    for index, sole in enumerate(motion.soles):
+        at_once = BODY_STEPS_AT_ONCE if sole.sole.prop else STEPS_AT_ONCE
+        for contact in contacts_of(character, number, index, 0):
+            stride = ceil((contact.during.stop - contact.during.start) / MOST_STEPS)
+            step = stride * motion.time_step
+            timing = Timing(step, STEPS_AHEAD, STEPS_AHEAD * step * motion.frame_rate)  # so none are laid out ahead
+            yield _Contact(contact, contact.layout(grid.frames, stride), timing, at_once, cells)
+
+
+def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotContacts]:
+    """Press all contacts, and choose those that tell the typical depth in other materials."""
+    prints = yield from _press(contacts, range(len(contacts)), ground)
+    depths = _depths(prints, len(contacts))
+    feet = np.array([contact.layout.sole.prop is None for contact in contacts], bool)
+    asked = np.flatnonzero(feet if feet.any() else ~feet)
+    impulse = np.array([contact.impulse for contact in contacts])[asked]
+    typical = asked[typical_contacts(depths[asked], impulse)]
+    among = typical if len(typical) else asked[main_contacts(impulse)]
+    beside = max(0, (len(among) - SAMPLE) // 2)
+    sample = among[np.argsort(depths[among], kind="stable")][beside : len(among) - beside].tolist()
+    beneath = _beneath(contacts, sample, prints)
+    return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample, beneath)
+
+
+def _press(contacts: Sequence[_Contact], chosen: Iterable[int], ground: SoftGround) -> Slices[dict[int, Footprint]]:
+    """Press contacts of these numbers into the ground, one after the other; the prints of those that leave one."""
+    flat = replace(ground.material, rim_reach=0.0, repose_angle=0.0)  # what rises beside a print does not deepen it
+    solvers: dict[int, GroundSolver] = {}
+    latest: dict[tuple[int, int], tuple[int, OpenContact]] = {}
+    prints = {}
+    for number in chosen:
+        contact = contacts[number]
+        layout, cells, timing, during = contact.layout, contact.cells, contact.timing, contact.source.during
+        if id(cells) not in solvers:
+            state = HeightField(cells.cell_size)
+            solvers[id(cells)] = GroundSolver(replace(ground, material=flat), state, cells)
+        until, earlier = latest.get(contact.source.of, (None, None))
+        opened = OpenContact(layout, earlier if until == during.start else None)
+        latest[contact.source.of] = during.stop, opened
+        for start in range(layout.first, layout.end, contact.at_once):
+            end = min(start + contact.at_once, layout.end)
+            solvers[id(cells)].step([opened], start, end, float(layout.steps.frames[end - layout.first - 1]), timing)
+            yield
+        if opened.recorder:
+            prints[number] = opened.footprint()
+    return prints
+
+
+def _depths(prints: dict[int, Footprint], count: int) -> Array:
+    """Depth of so many contacts [m], 0 of those that leave no print."""
+    return np.array([prints[number].max_depth_m if number in prints else 0.0 for number in range(count)])
+
+
+def _beneath(contacts: Sequence[_Contact], sample: Sequence[int], prints: dict[int, Footprint]) -> list[int]:
+    """Contacts on which those of a sample tread, first those that came shortly before."""
+    shared = [
+        (number - earlier, earlier)
+        for number in sample
+        for earlier in range(number)
+        if earlier not in sample
+        and {number, earlier} <= prints.keys()
+        and contacts[earlier].cells is contacts[number].cells
+        and prints[earlier].window.intersects(prints[number].window)
+    ]
+    return list(dict.fromkeys(earlier for _, earlier in sorted(shared)))[:BENEATH]
+
+
+@sliced
 def matching_modulus(
-    contacts: ContactLoads, material: GroundMaterial, depth: float, pressure: Pressure = "UNIFORM"
-) -> float:
+    contacts: ShotContacts, material: GroundMaterial, depth: float, pressure: Pressure
+) -> Slices[float]:
     """The modulus [Pa] at which the typical print gets a depth, everything else being equal.
 
     Parameters
     ----------
-    contacts : ContactLoads
+    contacts : ShotContacts
     material : GroundMaterial
     depth : float
         Wanted depth of the typical print [m].
@@ -198,33 +224,46 @@ def matching_modulus(
     InputError
         If no modulus gives that depth.
     """
-
-    def reached(modulus: float) -> float:
-        return contacts.typical(replace(material, youngs_modulus=modulus), pressure)
-
-    modulus = material.youngs_modulus
-    for _ in range(FREE_TRIALS):
-        found = reached(modulus)
-        if abs(found - depth) <= MATCH_TOLERANCE * depth:
-            return modulus
-        if not found > 0:
-            break
-        modulus = float(np.clip(modulus * found / depth, SOFTEST, STIFFEST))  # depths are about inverse to it
-    low, high = SOFTEST, STIFFEST
-    if not reached(high) <= depth <= material.layer_depth:
+    if not 0 < depth <= material.deepest:
         raise InputError(
-            f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and the layer's, "
-            f"{material.layer_depth * 100:.3g} cm."
+            f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and that of the layer when "
+            f"packed, {material.deepest * 100:.3g} cm."
         )
-    if not reached(low) > 0:
-        raise InputError(TAKES_NO_PRINT)
-    for _ in range(MOST_TRIALS):
-        modulus = float(np.sqrt(low * high))
-        found = reached(modulus)
-        if abs(found - depth) <= MATCH_TOLERANCE * depth:
+    tried: list[tuple[float, float]] = []
+    modulus = material.youngs_modulus
+    while len(tried) < MOST_TRIALS:
+        reached = yield from typical_depth.slices(contacts, replace(material, youngs_modulus=modulus), pressure)
+        if abs(reached - depth) <= MATCH_TOLERANCE * depth:
             return modulus
-        low, high = (modulus, high) if found > depth else (low, modulus)
+        tried.append((modulus, reached))
+        if modulus == SOFTEST and reached < depth:
+            break
+        modulus = next_modulus(tried, depth)
+    if not any(reached for _, reached in tried):
+        raise InputError(TAKES_NO_PRINT)
     raise InputError(
         f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm: lower Settling Time in Advanced > "
         "Realism, or choose a smaller depth."
     )
+
+
+def next_modulus(tried: Sequence[tuple[float, float]], depth: float) -> float:
+    """The modulus [Pa] to try next for a depth [m], after some with the depths that they gave; the latest last.
+
+    Examples
+    --------
+    >>> next_modulus([(2e5, 0.06)], 0.03)
+    400000.0
+    """
+    modulus, reached = tried[-1]
+    power = 1.0
+    if len(tried) > 1 and tried[-2][0] != modulus and tried[-2][1] and reached:
+        fall = np.log(tried[-2][1] / reached) / np.log(modulus / tried[-2][0])
+        power = float(np.clip(fall, LEAST_POWER, MOST_POWER))
+    guess = modulus * (reached / depth) ** (1 / power)
+    softer = [before for before, deep in tried if deep > depth]
+    stiffer = [before for before, deep in tried if deep < depth]
+    low, high = max(softer, default=SOFTEST), min(stiffer, default=STIFFEST)
+    if softer and stiffer and (len(tried) >= FREE_TRIALS or not low < guess < high):
+        return float(np.sqrt(low * high))
+    return float(np.clip(guess, low, high))

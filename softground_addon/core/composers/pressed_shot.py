@@ -13,6 +13,7 @@ from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
 from ..loads.estimate import CharacterLoads
 from ..motion.motion import CharacterMotion
+from ..numerics.slices import Slices
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
@@ -85,7 +86,7 @@ def press_shot(
     footprints, forces = yield from _simulate(wanted, loads, ground)
     before = None
     for _ in range(LEAN_PASSES):
-        left = _edited(wanted, ground, footprints, edits)
+        left = yield from _edited(wanted, ground, footprints, edits)
         yield None
         now = yield from leaning.slices(loads, standing, terrain, left.edited, asked)
         if not leans_anew(now, before):
@@ -96,16 +97,16 @@ def press_shot(
         footprints, forces = yield from _simulate(wanted, loads, ground)
     check_volumes(footprints, wanted.material, factors)
     yield None
-    left = _edited(wanted, ground, footprints, edits)
+    left = yield from _edited(wanted, ground, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, left, asked)
     return PressedShot(loads, left, forces, responses)
 
 
 def _edited(
     wanted: BakeSettings, ground: SoftGround, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
-) -> BakeRecord:
+) -> Slices[BakeRecord]:
     left = BakeRecord(footprints, {})
-    return with_edits(left, edits, ground, wanted.cell_size_m) if edits else left
+    return (yield from with_edits.slices(left, edits, ground, wanted.cell_size_m)) if edits else left
 
 
 def _simulate(
@@ -113,7 +114,7 @@ def _simulate(
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_cell_size(loads, wanted.cell_size_m, wanted.longest_bake_s)
+    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     for result in simulate(loads, ground, wanted.cell_size_m):

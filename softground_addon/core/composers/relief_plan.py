@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.presets import SURFACES
-from ..motion.motion import CharacterMotion, Sole
+from ..ground.surfaces import SURFACES
+from ..motion.motion import CharacterMotion
+from ..motion.sole_motion import Sole
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
@@ -114,7 +115,7 @@ def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> Reli
     Parameters
     ----------
     inputs : mapping
-        Of a bake, as the record has them; those of earlier versions know no relief.
+        Of a bake, as the record has them.
     footprints : sequence of Footprint
         All of the bake.
 

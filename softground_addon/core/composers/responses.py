@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..findings import Finding
 from ..ground.heightfield import Terrain
+from ..legs.grounding import Response, responding
 from ..loads.estimate import CharacterLoads
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
-from ..response.grounding import Response, responding
 from ..response.moved_steps import Followed, OutOfReach, follow
 from ..response.performance import suggested_speed
 from ..response.response import Gaps, at_scene_frames, gaps, mean_sinkage, respond, stood_on

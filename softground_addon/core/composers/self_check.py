@@ -15,8 +15,11 @@ from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
 from ..loads.estimate import CharacterLoads
 from ..loads.missed_steps import advice, missed_steps
+from ..loads.missing_ground import beyond_edge
 from ..loads.sliding import treadmill_speed
-from ..motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin, shortest_length
+from ..motion.motion import CharacterMotion, LowSkin
+from ..motion.sole_motion import shortest_length
+from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
 from ..pressing.sole_points import places, sole_points
 from ..record.footprints import QUANTUM, Footprint
@@ -45,7 +48,6 @@ SOME_FRAMES = 200
 
 PERSON_MASS, PERSON_LEG = 77.5, 0.87
 """A person of 1.78 m [kg], hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
-LEG_OF_STATURE = 0.491
 MASS_RANGE = 4.0
 """Ratio of mass to that of the body's skin, or of a person of the same leg length, beyond which it is asked about."""
 APART = 0.02
@@ -67,6 +69,11 @@ SLOW_STRIDES, SLOW_SWINGS = 1.6, 2.4
 at free speed, and in 2 in a creeping walk, as the leg's own pendulum sets it."""
 LEAST_STRIDE = 0.8
 """Shorter strides are shuffles, which have no pace, in leg lengths."""
+
+AT_BOTTOM = 0.02
+"""A print is as deep as the ground gives way if it lacks no more than this part of it."""
+MANY_AT_BOTTOM = 0.25
+"""Share of such prints that is said."""
 
 
 @sliced
@@ -106,16 +113,19 @@ def self_check(
     return found
 
 
+def no_motion(motion: CharacterMotion) -> Finding | None:
+    """What to say of a character that stands still."""
+    if motion.centre is not None or not motion.stands_still:
+        return None
+    remedy = "check that its action has keys in them, is assigned with its slot, and is not muted."
+    return Finding("no_motion", "warning", f"'{motion.name}' does not move in these frames", remedy)
+
+
 def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
     """Whether it moves, prints and gets along."""
     motion = character.motion
-    if motion.centre is None and motion.stands_still:
-        yield Finding(
-            "no_motion",
-            "warning",
-            f"'{motion.name}' does not move in these frames",
-            "check that its action has keys in them, is assigned with its slot, and is not muted.",
-        )
+    if still := no_motion(motion):
+        yield still
     elif not steps:
         yield Finding(
             "no_print",
@@ -145,7 +155,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "warning",
             f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while planted, and print over "
             "each other.",
-            "Press Walk Ahead in the Character panel, or use the animation with its root motion.",
+            "Press Walk Ahead, or use the animation with its root motion.",
         )
 
 
@@ -161,15 +171,13 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
         )
     if motion.centre is not None:
         return  # a prop has no legs to go by
-    height = motion.skin.height if motion.skin else motion.leg_length / LEG_OF_STATURE
-    if not SMALLEST < height < TALLEST:
-        tall = f"{height:.0f} m" if height > 1 else f"{height * 100:.2g} cm"
-        units, scale = ("centimetres", "0.01") if height > 1 else ("metres, and was read as centimetres", "100")
+    if unit := wrong_unit(motion.stature):
+        size = f"{motion.stature:.0f} m" if motion.stature > 1 else f"{motion.stature * 100:.2g} cm"
         yield Finding(
             "unit_scale",
             "error",
-            f"'{motion.name}' is {tall} tall: its file is in {units}.",
-            f"Press Scale by {scale} in the Character panel, or leave it if the size is intended.",
+            f"'{motion.name}' is {size} tall: its file is in {unit}.",
+            f"Press Scale by {scale_to_metres(motion.stature):g}, or leave it if the size is intended.",
         )
         return  # with its size, the mass that suits it changes
     likely, by = motion.skin.mass if motion.skin else 0.0, "the volume of its skin"
@@ -180,7 +188,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "mass_of_size",
             "warning",
             f"'{motion.name}' weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
-            "Set Mass in the Character panel.",
+            "Set Mass.",
         )
 
 
@@ -223,7 +231,8 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
             "slow_motion",
             "note",
             f"'{motion.name}' walks about {factor:.1f} times slower than the length of its legs suggests",
-            "set the frame rate of the scene to that of the animation, or leave it if slow motion is intended.",
+            "set the frame rate of the scene to that of the animation, or leave it if slow motion, or a model of a "
+            "larger body, is intended.",
         )
 
 
@@ -273,9 +282,9 @@ class _Touching:
 
     skin: LowSkin
     on: Mask
-    """Which parts are where they rest, (F, P)."""
+    """Which parts are where they rest on the ground, (F, P)."""
     down: Mask
-    """The same, with parts that have sunk into the ground: some of their skin is at its level."""
+    """The same, also beyond its edge, and of parts that have sunk into it: some of their skin is at its level."""
 
     def near(self, step: Footprint, frames: slice, reach: float) -> Mask:
         """At which of some frames skin touches within reach of a step."""
@@ -294,10 +303,13 @@ def _skin(
 ) -> Slices[list[Finding]]:
     """Whether ground, steps and resting skin agree."""
     motion = character.motion
-    height = np.empty(skin.rise.shape)
+    beyond = beyond_edge(motion, terrain)
+    height, has_ground = np.empty(skin.rise.shape), np.empty(skin.rise.shape, dtype=bool)
     for start in range(0, len(height), SOME_FRAMES):
-        x, y, z = np.moveaxis(skin.position[start : start + SOME_FRAMES], -1, 0)
-        height[start : start + SOME_FRAMES] = z - terrain.heights(x, y)
+        now = slice(start, start + SOME_FRAMES)
+        x, y, z = np.moveaxis(skin.position[now], -1, 0)
+        height[now] = z - beyond.heights(x, y)
+        has_ground[now] = np.isfinite(terrain.heights(x, y))
         yield
     height[~np.isfinite(height)] = np.inf
     over = _resting(height, skin)
@@ -328,7 +340,7 @@ def _skin(
     else:
         over = 0.0  # what presses is the ground itself, and the feet may rest a little apart
     rise = (height - over) / skin.height
-    touching = _Touching(skin, np.abs(rise) < NEAR, (rise < NEAR) & (rise > -SUNK))
+    touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         found += yield from _skin_and_steps(motion, touching, steps)
     return found
@@ -410,12 +422,21 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
     return found
 
 
+def bottomed_out(footprints: Sequence[Footprint], material: GroundMaterial, ground: str) -> list[Finding]:
+    """What to say where steps end at the bottom of the layer, whose floors are then flat."""
+    count = sum(footprint.max_depth_m > (1.0 - AT_BOTTOM) * material.deepest for footprint in footprints)
+    if not count or count < MANY_AT_BOTTOM * len(footprints):
+        return []
+    message = f"{count} of {len(footprints)} steps press '{ground}' as far as it goes, {material.deepest * 100:.3g} cm"
+    return [Finding("bottomed_out", "warning", message, "make the layer deeper, or choose a firmer ground.")]
+
+
 RIM_TOLERANCE = 1e-6
-"""Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
+"""Largest relative error of the rim's volume that passes (docs/model.md section 4)."""
 
 
 def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
-    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4.
+    """Raise BakeError if a footprint breaks an invariant of docs/model.md section 4.
 
     Parameters
     ----------
@@ -436,7 +457,7 @@ def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, fac
                 f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
             )
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
-        if footprint.max_depth_m > (material.layer_depth * depth.max() + fallen) * (1 + 1e-9):
+        if footprint.max_depth_m > (material.deepest * depth.max() + fallen) * (1 + 1e-9):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
                 "was written. Please report this as a bug."

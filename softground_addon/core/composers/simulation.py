@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.heightfield import HeightField, Window
+from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import Window
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
-from ..motion.motion import Sole
+from ..motion.sole_motion import Sole
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -108,22 +109,18 @@ class Simulation:
 
     def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press a motion; see `simulate`."""
-        grid = _time_grid(loads)
+        grid = time_grid(loads)
         waiting = _Waiting(loads, grid)
         contacts: list[OpenContact] = []
         start = 1
         for end in grid.shown + 1:
             contacts += waiting.due(int(end))
             frame = float(grid.frames[end - 1])
-            changed = self._solver.advance(contacts, start, int(end), frame, grid.timing)
-            last = end == grid.shown[-1] + 1
-            ended = [contact for contact in contacts if contact.layout.end <= end or last]
-            for contact in ended:
-                contacts.remove(contact)
-                changed += self._solver.settle(contact, frame)
-                if self._solver.weathered:
-                    ended_at = float(contact.layout.steps.frames[-1])
-                    self._solver.weathered.ended(ended_at, contact.compressed, contact.area)
+            is_last = end == grid.shown[-1] + 1
+            changed, ended = self._solver.step(contacts, start, int(end), frame, grid.timing, is_last=is_last)
+            if weathered := self._solver.weathered:
+                for contact in ended:
+                    weathered.ended(float(contact.layout.steps.frames[-1]), contact.compressed, contact.area)
             start = int(end)
             yield FrameResult(
                 frame,
@@ -141,14 +138,14 @@ class _Waiting:
     Each is opened when its time comes: its poses at all steps take memory.
     """
 
-    def __init__(self, loads: Sequence[CharacterLoads], grid: _TimeGrid) -> None:
+    def __init__(self, loads: Sequence[CharacterLoads], grid: TimeGrid) -> None:
         self._frames = grid.frames
         self._latest: dict[tuple[int, int], OpenContact] = {}
         contacts = [
             contact
             for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True))
             for index in range(len(character.motion.soles))
-            for contact in _contacts(character, number, index, offset)
+            for contact in contacts_of(character, number, index, offset)
         ]
         self._contacts = deque(sorted(contacts, key=lambda contact: contact.first))
 
@@ -165,7 +162,7 @@ class _Waiting:
 
 
 @dataclass(frozen=True)
-class _Contact:
+class ShotContact:
     """A sole from touching down to leaving.
 
     Attributes
@@ -195,16 +192,16 @@ class _Contact:
         """What its footprint keeps of its steps."""
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
-    def layout(self, frames: Array) -> ContactLayout:
-        """How it is laid out, at steps of the time grid that are at these scene frames."""
+    def layout(self, frames: Array, stride: int = 1) -> ContactLayout:
+        """How it is laid out, at steps of the time grid that are at these scene frames; at each of so many only."""
         motion, contacts, forces = self.character.motion, self.character.contacts, self.character.forces
-        index, during = self.of[1], self.during
+        index, during = self.of[1], slice(self.during.start, self.during.stop, stride)
         sole, poses = motion.soles[index].sole, motion.soles[index].transforms
         steps = Steps(
             self.first,
-            frames[self.first : self.first + during.stop - during.start],
+            frames[self.first : self.first + during.stop - during.start : stride],
             poses[during],
-            poses[max(0, during.start - 2) : during.start],
+            poses[max(during.start % stride, during.start - 2 * stride) : during.start : stride],
             forces.forces[during, index],
             contacts.normal[during, index],
             forces.centre_of_pressure[during, index],
@@ -218,20 +215,21 @@ def _is_kept(sole: Sole) -> bool:
     return sole.prop is None or len(sole.prop.vertices) <= MOST_VERTICES
 
 
-def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
+def contacts_of(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[ShotContact]:
     """The contacts of a sole of a character, which appears at a step of the time grid."""
     motion, pieces = character.motion.soles[index], list(tracks(character, index))
     points = sole_points(motion.sole, motion.transforms) if pieces and not motion.sole.prop else None
-    pressing = kept_sole(motion.sole, flat_pose(motion.transforms)) if pieces and _is_kept(motion.sole) else None
+    keeps = pieces and (motion.sole.prop is None or len(motion.sole.prop.vertices) <= MOST_VERTICES)
+    pressing = kept_sole(motion.sole, flat_pose(motion.transforms)) if keeps else None
     for piece in pieces:
         begin = max(piece.start, 1 - offset)  # the first step of the grid is a state, it presses nothing
         if begin < piece.stop:
             during, since = slice(begin, piece.stop), piece.start + offset
-            yield _Contact(character, (number, index), during, since, begin + offset, points, pressing)
+            yield ShotContact(character, (number, index), during, since, begin + offset, points, pressing)
 
 
 @dataclass(frozen=True)
-class _TimeGrid:
+class TimeGrid:
     """The steps that all characters share.
 
     Attributes
@@ -251,7 +249,7 @@ class _TimeGrid:
     timing: Timing
 
 
-def _time_grid(loads: Sequence[CharacterLoads]) -> _TimeGrid:
+def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
     if not loads:
         raise InputError("There is no character to bake: add one with 'Add Character'.")
     motions = [character.motion for character in loads]
@@ -271,7 +269,7 @@ def _time_grid(loads: Sequence[CharacterLoads]) -> _TimeGrid:
     shown = np.flatnonzero(np.abs(frames - first - np.rint(frames - first)) < 1e-6)
     frames[shown] = first + np.rint(frames[shown] - first)
     steps = int(shown[1] - shown[0]) if len(shown) > 1 else 1
-    return _TimeGrid(frames, shown, offsets, Timing(motions[0].time_step, steps, spacing * steps))
+    return TimeGrid(frames, shown, offsets, Timing(motions[0].time_step, steps, spacing * steps))
 
 
 def _state_at(

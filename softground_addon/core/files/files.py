@@ -19,13 +19,13 @@ from pathlib import Path
 from ..errors import InputError
 
 _MACHINE = hashlib.sha256(platform.node().encode(errors="replace")).hexdigest()[:8]
-"""In the names of partial files: who may still be writing them cannot be seen from another machine."""
+"""Part of the names of partial files: another machine cannot see if they are still being written."""
 
 LARGEST = 2**40
-"""Size of a file that is read through [bytes]; what claims more is none of a disk, such as the kernel's memory."""
+"""Largest size of a file that is read [bytes]; larger ones are not on a disk, such as the kernel's memory."""
 
 _BLOCK = 2**20
-"""Read at a time [bytes]."""
+"""Size of a part that is read at a time [bytes]."""
 
 
 def identity(path: Path) -> str:
@@ -46,10 +46,10 @@ def regular_blocks(path: Path, largest: int = LARGEST) -> Iterator[bytes]:
         raise OSError(errno.EINVAL, "it is not a regular file", str(path))
     if about.st_size > largest:
         raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
-    left = about.st_size
+    remaining = about.st_size
     with path.open("rb") as content:
-        while left > 0 and (block := content.read(min(left, _BLOCK))):
-            left -= len(block)
+        while remaining > 0 and (block := content.read(min(remaining, _BLOCK))):
+            remaining -= len(block)
             yield block
 
 
@@ -80,13 +80,13 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise _not_written(path, error) from error
     finally:
-        for left in (partial, partial.with_name(f"{partial.name}@")):  # which Blender saves to before it renames
+        for leftover in (partial, partial.with_name(f"{partial.name}@")):  # which Blender saves to before it renames
             with suppress(OSError):
-                left.unlink(missing_ok=True)
+                leftover.unlink(missing_ok=True)
 
 
 def check_place(path: Path) -> None:
-    """Find out by trying, before there is anything to write, whether `replacing` could write a file.
+    """Try, before there is anything to write, if `replacing` could write a file.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def check_room(path: Path, size: int) -> None:
 
 
 def check_not_full(path: Path) -> None:
-    """Raise OSError where nothing can be added to a file, or none be made: a writer may not tell, or not tell why."""
+    """Raise OSError if a file cannot be made or added to: a writer may not say so, or not say why."""
     with path.open("ab") as written:
         size = written.tell()
         written.write(bytes(_LARGEST_BLOCK))
@@ -128,15 +128,15 @@ def check_not_full(path: Path) -> None:
 
 
 _LARGEST_BLOCK = 2**20
-"""Of a disk [bytes]: what is added to a file may fit into its last block otherwise."""
+"""Largest block of a disk [bytes]: fewer bytes may fit into the last block of a file."""
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove what killed writers of `path` on this machine have left beside it; nobody here may be writing it now."""
+    """Remove leftovers of killed writers of `path` on this machine; nobody here may be writing it now."""
     name = re.compile(rf"\.{re.escape(path.stem)}\.{_MACHINE}-[0-9a-f]{{16}}\.partial{re.escape(path.suffix)}@?")
-    for left in path.parent.iterdir():
-        if name.fullmatch(left.name):
-            left.unlink(missing_ok=True)
+    for leftover in path.parent.iterdir():
+        if name.fullmatch(leftover.name):
+            leftover.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -156,14 +156,14 @@ def _partial(path: Path) -> Path:
 
 
 _IN_USE = (5, 32)
-"""What Windows calls a file that another program has open, as scanners and sync clients do with new ones."""
+"""Errors of Windows for a file that another program has open, as scanners and sync clients do with new ones."""
 
 _PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
-"""Before a file in use is tried again [s]."""
+"""Pauses before a file in use is tried again [s]."""
 
 
 def _rename(partial: Path, path: Path) -> None:
-    """Give a file its name; where Windows says that it is in use, wait for whoever only looks at it."""
+    """Give a file its name; where Windows says that it is in use, wait for scanners and the like."""
     for pause in _PAUSES:
         try:
             partial.replace(path)

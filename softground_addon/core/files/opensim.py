@@ -49,7 +49,7 @@ class FootForce:
 
     @property
     def identifier(self) -> str:
-        """What its columns begin with: letters, digits and underscores.
+        """Prefix of its columns: letters, digits and underscores.
 
         Examples
         --------

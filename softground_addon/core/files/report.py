@@ -1,4 +1,4 @@
-"""The report of a bake: what happened, in numbers, as JSON."""
+"""The report of a bake in numbers, as JSON."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def build(
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, Any]:
-    """Everything that is said of a bake, ready for JSON.
+    """The whole report of a bake, ready for JSON.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def build(
     input_hash : str
         From `hash_inputs`, of all inputs but the edits: with these, it is equal for bakes with equal inputs.
     steps : sequence of EditableStep
-        Of the `BakeRecord`. Those of which nothing is left have `left_out`.
+        Of the `BakeRecord`. Those that made no print, or were muted, have `left_out`.
     edits : mapping
         Of the `BakeRecord`: why they are not as they were baked.
     offsets_mm : mapping of character to (sole to mm)
@@ -55,7 +55,7 @@ def build(
     playback_error_m : float, optional
         Largest error of the played heights against the record's [m].
     findings : sequence of Finding
-        What is wrong, and what to do.
+        Problems and remedies.
     forces : mapping, optional
         Force per frame and sole [N], on request.
     gaps_mm : mapping, optional
@@ -65,7 +65,7 @@ def build(
     suggested_speed : mapping, optional
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
-        From `core.after.events`.
+        From `core.events.events`.
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
@@ -102,11 +102,11 @@ def build(
     return report
 
 
-def _step(one: EditableStep) -> dict[str, Any]:
-    """What the report says of a step, as it was left; where nothing is, as it was baked."""
-    footprint = one.left or one.baked
+def _step(editable: EditableStep) -> dict[str, Any]:
+    """Entry of a step, as it lies on the ground; as it was baked if nothing of it does."""
+    footprint = editable.left or editable.baked
     step: dict[str, Any] = {
-        "id": one.name,
+        "id": editable.name,
         "contact": footprint.sole,
         "character": footprint.character,
         "frame_start": round(float(footprint.start_frame), 3),
@@ -118,9 +118,9 @@ def _step(one: EditableStep) -> dict[str, Any]:
         "compressed_m3": float(footprint.compressed_m3),
         "rim_m3": float(footprint.rim_m3),
     }
-    if one.edit != UNCHANGED or one.is_copy:
-        step["edit"] = edit_as_json(one.edit)
-    if one.left is None:
+    if editable.edit != UNCHANGED or editable.is_copy:
+        step["edit"] = edit_as_json(editable.edit)
+    if editable.left is None:
         step["left_out"] = True
     return step
 

@@ -15,33 +15,15 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from . import surfaces
+
 Array = NDArray[np.float64]
 
 SIZE_FALL = 2.5
 """Exponent with which the number of crumbs falls over their diameter, n(d) ~ d^-2.5: by eye."""
 
-LARGEST = {"snow": 0.024, "sand": 0.002, "wet_sand": 0.012, "mud": 0.020, "soil": 0.030}
-"""Diameter of the largest crumbs of a surface [m]: broken crust, grains, clumps, drops, clods."""
-
-_ROUND = ((1.0, 1.0, 0.85),) * 6
-_STRETCH = {
-    "snow": ((1.0, 1.0, 0.65), (1.0, 0.8, 0.6), (1.0, 0.9, 0.75), (1.0, 1.0, 0.5), (1.0, 0.75, 0.7), (1.0, 0.9, 0.6)),
-    "mud": (
-        (1.0, 0.9, 0.35),
-        (1.0, 0.7, 0.45),
-        (1.0, 0.85, 0.25),
-        (1.0, 0.8, 0.6),
-        (1.0, 0.45, 0.3),
-        (1.0, 0.25, 0.2),
-    ),
-}
-"""Along three axes, of each shape: broken crust is flat, mud comes down as flat clods, drops and strings."""
-_ROUGHNESS = {"snow": 0.14, "sand": 0.15, "wet_sand": 0.2, "mud": 0.1, "soil": 0.2}
-"""How far their surface is from a sphere."""
-_CUTS = {"snow": 5, "sand": 2, "wet_sand": 2, "soil": 6}
-"""Flat sides, along which they broke."""
 _NEAREST_CUT, _FARTHEST_CUT = 0.6, 0.9
-"""Of these sides, from the middle of a lump of radius 1."""
+"""Of the flat sides, from the middle of a lump of radius 1."""
 _TEXELS = 21
 """Along a side of a `Crowns` map."""
 
@@ -116,15 +98,16 @@ class Lump:
 @cache
 def lumps(surface: str) -> tuple[Lump, ...]:
     """The shapes that the crumbs of a surface have."""
-    return tuple(_lump(surface, number, stretch) for number, stretch in enumerate(_STRETCH.get(surface, _ROUND)))
+    like = surfaces.find(surface).fragments
+    return tuple(_lump(like, number, stretch) for number, stretch in enumerate(like.stretch))
 
 
-def _lump(surface: str, number: int, stretch: tuple[float, float, float]) -> Lump:
+def _lump(like: surfaces.Fragments, number: int, stretch: tuple[float, float, float]) -> Lump:
     random = np.random.default_rng(number)
     way, faces = _sphere()
     waves = random.normal(size=(6, 3)) * 3.5
-    radius = 1.0 + _ROUGHNESS[surface] * np.sin(way @ waves.T + 2 * np.pi * random.random(len(waves))).sum(axis=1) / 2
-    cuts = random.normal(size=(_CUTS.get(surface, 0), 3))
+    radius = 1.0 + like.roughness * np.sin(way @ waves.T + 2 * np.pi * random.random(len(waves))).sum(axis=1) / 2
+    cuts = random.normal(size=(like.cuts, 3))
     cuts /= np.linalg.norm(cuts, axis=1, keepdims=True)
     for cut, far in zip(cuts, random.uniform(_NEAREST_CUT, _FARTHEST_CUT, len(cuts)), strict=True):
         radius = np.minimum(radius, far / np.maximum(way @ cut, 1e-3))

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import TILE, SparseGrid, Window
+from .sparse_grid import TILE, SparseGrid, Window
 
 Grid = TypeVar("Grid", bound=SparseGrid)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import Window
+from .sparse_grid import Window
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -6,13 +6,15 @@ import json
 import math
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import cast, get_args
 
 from ..errors import InputError
+from . import surfaces
+from .hand_hardness import boot_depth
 from .material import MATERIAL_RANGES, GroundMaterial, Pressure
 
 FOLDER = Path(__file__).parents[2] / "presets"
@@ -27,8 +29,8 @@ LARGEST = 2**20
 """Size of a preset that is read [bytes]."""
 
 
-SURFACES = ("snow", "sand", "wet_sand", "mud", "soil")
-"""Looks that a preset may ask for; each is a procedural render material."""
+SECTIONS = {"EVERYDAY": "Everyday", "MEASURED": "Measured", "PAPER": "Paper"}
+"""Parts of the menu that a preset may ask for, with their titles, in their order."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Preset:
     source : str
         Where its numbers come from.
     surface : str
-        One of `SURFACES`.
+        See `surfaces`.
     material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE', optional
     tread : float, optional
@@ -51,8 +53,10 @@ class Preset:
         Cells that lie along the shortest sole.
     debris : bool, optional
         Whether steps throw what physics says.
+    section : str, optional
+        One of `SECTIONS`.
 
-    What is optional stays as it was where it is None: presets of version 0.1 had none of it.
+    What is optional stays as it was where it is None.
     """
 
     name: str
@@ -63,6 +67,7 @@ class Preset:
     tread: float | None = None
     cells_along_sole: float | None = None
     debris: bool | None = None
+    section: str | None = None
 
 
 RANGES = {"tread": (0.0, 0.1), "cells_along_sole": (4.0, 1000.0)}
@@ -110,15 +115,14 @@ def parse(text: str, origin: str) -> Preset:
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
         raise InputError(f"{origin}: this is not a SoftGround preset of schema_version {SCHEMA_VERSION}.")
     name, source, surface = (
-        content.get(key, default) for key, default in (("name", ""), ("source", ""), ("surface", "soil"))
+        content.get(key, default) for key, default in (("name", ""), ("source", ""), ("surface", surfaces.DEFAULT))
     )
     material = content.get("material")
     if not isinstance(name, str) or not name.strip():
         raise InputError(f"{origin}: the preset has no 'name'.")
     if not isinstance(source, str):
         raise InputError(f"{origin}: 'source' must be text.")
-    if surface not in SURFACES:
-        raise InputError(f"{origin}: 'surface' is {surface!r}; it must be one of {', '.join(SURFACES)}.")
+    surfaces.find(surface, origin)
     if not isinstance(material, dict):
         raise InputError(f"{origin}: the preset has no 'material' table.")
     pressure, numbers = content.get("pressure"), {}
@@ -131,8 +135,11 @@ def parse(text: str, origin: str) -> Preset:
     debris = content.get("debris")
     if not isinstance(debris, bool | None):
         raise InputError(f"{origin}: 'debris' is {debris!r}; it must be true or false.")
+    section = content.get("section")
+    if section is not None and section not in SECTIONS:
+        raise InputError(f"{origin}: 'section' is {section!r}; it must be one of {', '.join(SECTIONS)}.")
     checked, spread = validate_material(material, origin), cast("Pressure | None", pressure)
-    return Preset(name, source, surface, checked, spread, **numbers, debris=debris)
+    return Preset(name, source, surface, checked, spread, **numbers, debris=debris, section=section)
 
 
 def load(path: Path) -> Preset:
@@ -160,9 +167,18 @@ def dump(preset: Preset) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
-def _bare(name: str) -> str:
+def bare(name: str) -> str:
     """A name as it is compared: letters and digits, whatever their case and what stands between them."""
     return re.sub(r"[\W_]+", "_", name.casefold()).strip("_")
+
+
+def soft_to_firm(shown: Iterable[Preset]) -> list[Preset]:
+    """Presets of one section as the menu lists them: look by look, the one with the softest ground first."""
+    depths = {preset: boot_depth(preset.material) for preset in shown}
+    softest: dict[str, float] = {}
+    for preset, depth in depths.items():
+        softest[preset.surface] = max(depth, softest.get(preset.surface, 0.0))
+    return sorted(depths, key=lambda one: (-softest[one.surface], one.surface, -depths[one], one.name.casefold()))
 
 
 def _files(folders: tuple[Path, ...]) -> list[Path]:
@@ -186,13 +202,13 @@ def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
     InputError
         If there is none, listing those that there are.
     """
-    wanted, paths = _bare(name), _files(folders)
+    wanted, paths = bare(name), _files(folders)
     for path in paths:
-        if _bare(path.stem) == wanted:
+        if bare(path.stem) == wanted:
             return load(path)
     for path in paths:
         with suppress(InputError):  # another preset's file may be broken
-            if _bare((preset := load(path)).name) == wanted:
+            if bare((preset := load(path)).name) == wanted:
                 return preset
     known = ", ".join(path.stem for path in paths)
     raise InputError(f"There is no preset '{name}'. There are: {known}; or give the path of a .json file.")

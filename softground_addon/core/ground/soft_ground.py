@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import HeightField, SparseGrid, Terrain, Window
-from .material import GroundMaterial, Pressure
+from .heightfield import HeightField, Terrain
+from .material import STANDARD_GRAVITY, GroundMaterial, Pressure
+from .sparse_grid import SparseGrid, Window
 from .variation import Variation
 
 Array = NDArray[np.float64]
@@ -77,6 +78,8 @@ class SoftGround:
         How the ground varies from place to place.
     weathering : Weathering or None
         What steps find of earlier ones; None where these stay as they are.
+    gravity : float
+        [m/s²].
     """
 
     terrain: Terrain
@@ -84,3 +87,4 @@ class SoftGround:
     pressure: Pressure = "UNIFORM"
     variation: Variation | None = None
     weathering: Weathering | None = None
+    gravity: float = STANDARD_GRAVITY

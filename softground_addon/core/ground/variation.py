@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import SampledGrid, Window
+from .sparse_grid import SampledGrid, Window
 from .terrain import MeshTerrain
 
 Array = NDArray[np.float64]
@@ -51,10 +51,9 @@ class Factors(NamedTuple):
     depth: Array
     rim: Array
 
-    @property
-    def softness(self) -> Array:
-        """Compression per that of the material under the same stress."""
-        return self.depth / self.stiffness
+    def softness(self, exponent: float = 1.0) -> Array:
+        """Compression per that of the material under the same stress, which grows with a power of the strain."""
+        return self.depth / (self.stiffness if exponent == 1.0 else self.stiffness ** (1.0 / exponent))
 
 
 def layer_factors(factors: Factors | None) -> dict[str, Array]:

@@ -5,25 +5,46 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..numerics.intervals import runs
+from ..ground.display_spacing import spacing_of
 from .estimate import CharacterLoads
+from .tracks import tracks
 
-BYTES_PER_CELL = 1000.0
-"""What a cell under a print takes from simulation to playback [bytes], as measured on walks at 1 and 0.5 mm."""
+Array = NDArray[np.float64]
 
-SECONDS_PER_CELL = 5e-5
-"""What it takes to write [s], and over the square of the cell size ..."""
+BYTES_PER_VERTEX = 900.0
+"""What a vertex of the display mesh that moves takes [bytes], on figures of 2 cm to 7 m with cells of 0.4 to 20 mm."""
 
-SECONDS_OF_FINE_CELLS = 1.5e-11
-"""... [s m²]: 61, 65, 67 and 106 µs on a walk with cells of 4, 2, 1 and 0.5 mm, 50 to 90 on others, ..."""
+BYTES_PER_CELL_LAID_OUT = 85.0
+"""What a cell around a sole takes at each step of the simulation that is laid out [bytes]; of these there are at most
+..."""
 
-SECONDS_PER_CELL_HELD = 5.5e-5
-"""... and what it takes to simulate, for each second that a sole is on it [s/s]: 45 to 70 µs, standing or walking."""
+CELLS_AT_ONCE, STEPS_AT_ONCE = 4e6, 128
+"""... so many together, and steps, as `pressing.contact_layout` has it."""
+
+SECONDS_PER_CELL_LAID_OUT = 7e-8
+"""What a cell around a sole takes in each step of the simulation [s]: 40 to 110 ns, standing or walking, ..."""
+
+SECONDS_PER_CELL = 5e-6
+"""... what a cell that changes takes [s], ..."""
+
+SECONDS_PER_VERTEX = 3.7e-5
+"""... and what a vertex takes to write [s], and over the square of their distance ..."""
+
+SECONDS_OF_FINE_VERTICES = 1.5e-11
+"""... [s m²], as the display blur reaches over more of them."""
+
+BYTES_AT_LEAST, SECONDS_AT_LEAST = 10e6, 0.5
+"""What a bake of any size takes: [bytes] and [s]."""
+
+LARGEST_SPREAD = 4.0
+"""Cells around a sole that slides are laid out in parts of so many times its own box."""
 
 BYTES_PER_FRAME = 60e3
 """What a frame of a character takes from reading to playback [bytes], as measured on a walk of 100,000 frames."""
@@ -38,49 +59,115 @@ USABLE = 0.8
 """Share of the machine's memory that a bake may take."""
 
 
-def pressed_area(loads: Sequence[CharacterLoads]) -> float:
-    """Area that the soles of all characters cover on the ground, with each step counted [m²]."""
-    area = 0.0
+@dataclass(frozen=True)
+class Fineness:
+    """How finely a ground is pressed and shown.
+
+    Attributes
+    ----------
+    cell_size : float
+        [m]
+    rim_reach : float
+        Of its material [m].
+    relief : str
+        As in `settings.BakeSettings`.
+    most_vertices : int
+        That a close-up may have.
+    """
+
+    cell_size: float
+    rim_reach: float
+    relief: str = "OFF"
+    most_vertices: int = 0
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What soles cover on the ground, with each print counted: what a bake takes follows from it at any cell size.
+
+    Attributes
+    ----------
+    area : float
+        [m²]
+    edge : float
+        Length around it [m].
+    boxes : (K, 2) float array
+        Sides of the box in which each print is laid out [m].
+    steps : (K,) int array
+        Steps of the simulation in each.
+    """
+
+    area: float
+    edge: float
+    boxes: Array
+    steps: NDArray[np.intp]
+
+    def cells(self, cell_size: float, rim_reach: float) -> float:
+        """Cells that change: those that soles cover, and around them those that the rim reaches."""
+        reach = max(rim_reach, cell_size)
+        return float(self.area + self.edge * reach + len(self.steps) * np.pi * reach**2) / cell_size**2
+
+    def vertices(self, fine: Fineness) -> float:
+        """Vertices that show them, however many there may be."""
+        return self.cells(spacing_of(fine.cell_size, fine.relief), fine.rim_reach)
+
+    def laid_out(self, cell_size: float, rim_reach: float) -> Array:
+        """Cells of the window of each print, (K,)."""
+        sides: Array = self.boxes + 2 * max(rim_reach, cell_size)
+        return sides.prod(axis=1) / cell_size**2
+
+    def bake_costs(self, fine: Fineness) -> tuple[float, float]:
+        """Memory [bytes] and time [s] that a bake takes, within a factor of two on a machine of 2026."""
+        cells, laid_out = (count(fine.cell_size, fine.rim_reach) for count in (self.cells, self.laid_out))
+        vertices = min(self.vertices(fine), max(cells, fine.most_vertices))
+        at_once = np.minimum(laid_out * np.minimum(self.steps, STEPS_AT_ONCE), CELLS_AT_ONCE).max(initial=0.0)
+        memory = max(at_once * BYTES_PER_CELL_LAID_OUT, vertices * BYTES_PER_VERTEX)
+        simulating = laid_out @ self.steps * SECONDS_PER_CELL_LAID_OUT + cells * SECONDS_PER_CELL
+        spacing = spacing_of(fine.cell_size, fine.relief)
+        writing = vertices * (SECONDS_PER_VERTEX + SECONDS_OF_FINE_VERTICES / spacing**2)
+        return BYTES_AT_LEAST + float(memory), SECONDS_AT_LEAST + float(simulating + writing)
+
+
+def coverage_of(loads: Sequence[CharacterLoads]) -> Coverage:
+    """What the soles of all characters cover."""
+    area = edge = 0.0
+    boxes, steps = [], []
     for character in loads:
-        for index, sole in enumerate(character.motion.soles):
-            touching = character.contacts.touching[:, index]
-            steps = len(runs(touching)[0])
-            paths = sole.landmark_positions()[..., :2].mean(axis=1)
-            travel = np.linalg.norm(np.diff(paths, axis=0), axis=1)[touching[1:]].sum()
-            area += steps * sole.sole.area + float(travel) * float(np.ptp(sole.sole.outline[:, 1]))
-    return area
-
-
-def bake_time(loads: Sequence[CharacterLoads], cell_size: float) -> float:
-    """What a bake with cells of that size [m] takes [s], within a factor of two on a machine of 2026."""
-    held = 0.0
-    for character in loads:
-        areas = [sole.sole.area for sole in character.motion.soles]
-        held += float(character.contacts.touching.sum(axis=0) @ areas) * character.motion.time_step
-    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2
-    return (pressed_area(loads) * writing + held * SECONDS_PER_CELL_HELD) / cell_size**2
-
-
-def bake_memory(loads: Sequence[CharacterLoads], cell_size: float) -> float:
-    """What it takes of memory [bytes]."""
-    return pressed_area(loads) / cell_size**2 * BYTES_PER_CELL
+        for index, moved in enumerate(character.motion.soles):
+            sole, middles = moved.sole, moved.landmark_positions()[..., :2].mean(axis=1)
+            half = np.ptp(sole.outline, axis=0) / 2
+            around = float(np.linalg.norm(sole.outline - np.roll(sole.outline, 1, axis=0), axis=1).sum())
+            around = min(around, 2 * (sole.length + sole.breadth))  # however jagged the outline is
+            for print_of in tracks(character, index):
+                travel = float(np.linalg.norm(np.ptp(middles[print_of], axis=0)))
+                area += sole.area + travel * sole.breadth
+                edge += around + 2 * travel
+                reached = np.abs(moved.transforms[print_of, 0, :2, :2]) @ half
+                alone, path = 2 * reached.max(axis=0), middles[print_of]
+                along = np.ptp(np.concatenate([path - reached, path + reached]), axis=0)
+                boxes.append(np.minimum(along, alone * LARGEST_SPREAD**0.5))
+                steps.append(len(path))
+    return Coverage(area, edge, np.reshape(boxes, (-1, 2)), np.array(steps, np.intp))
 
 
 def check_cell_size(
-    loads: Sequence[CharacterLoads], cell_size: float, longest: float, available: float | None = None
+    loads: Sequence[CharacterLoads],
+    fine: Fineness,
+    longest: float,
+    available: float | None = None,
 ) -> None:
     """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
     Parameters
     ----------
     loads : sequence of CharacterLoads
-    cell_size : float
-        [m]
+    fine : Fineness
     longest : float
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
     """
+    cell_size = fine.cell_size
     for character in loads:
         length = max(sole.sole.length for sole in character.motion.soles)
         if length < cell_size:
@@ -90,20 +177,22 @@ def check_cell_size(
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
-    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size)
-    too_much = _too_much(needed, time, longest, available)
+    coverage = coverage_of(loads)
+
+    def taken(size: float) -> tuple[float, float]:
+        return coverage.bake_costs(replace(fine, cell_size=size))
+
+    too_much = _too_much(*taken(cell_size), longest, available)
     if not too_much:
         return
     sizes = cell_size * 1.05 ** np.arange(300)
     fits = [
-        size
-        for size in sizes[sizes < _shortest_of_largest(loads)]
-        if not _too_much(bake_memory(loads, size), bake_time(loads, size), longest, available)
+        size for size in sizes[sizes < _shortest_of_largest(loads)] if not _too_much(*taken(size), longest, available)
     ]
     remedy = f"set a cell size of at least {1.05 * fits[0] * 100:.2g} cm, or " if fits else ""  # it is rounded
     names = ", ".join(f"'{character.motion.name}'" for character in loads)
     raise InputError(
-        f"Cells of {cell_size * 100:g} cm would take about {_amount(needed, time)} for the steps of {names}, and "
+        f"Cells of {cell_size * 100:g} cm would take about {_amount(*taken(cell_size))} for the steps of {names}, and "
         f"{too_much}: {remedy}bake fewer frames."
     )
 
@@ -141,15 +230,18 @@ def _too_much(needed: float, time: float, longest: float, available: float | Non
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:
-        return f"{_duration(longest)} are allowed (Time Limit in Advanced > Mesh and Look, or --set longest_bake=N)"
+        return f"{duration(longest)} are allowed (Time Limit in Advanced > Mesh and Look, or --set longest_bake=N)"
     return ""
 
 
 def _amount(needed: float, time: float) -> str:
-    return f"{needed / 1e9:,.{int(needed < 1e10)}f} GB of memory and {_duration(time)}"
+    return f"{needed / 1e9:,.{int(needed < 1e10)}f} GB of memory and {duration(time)}"
 
 
-def _duration(time: float) -> str:
+def duration(time: float) -> str:
+    """A time [s] as it is said."""
+    if time < 60:
+        return f"{np.ceil(time):.0f} seconds"
     return f"{np.ceil(time / 60):,.0f} minutes" if time < 7200 else f"{time / 3600:,.0f} hours"
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.body_dynamics import FREE_FALL, BodyDynamics, flights
+from ..dynamics.centre_of_pressure import extents, lowest_points
+from ..dynamics.load_sharing import whole_body_shares
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import close_short, runs
 from ..numerics.smoothing_spline import smooth_path
-from .body_dynamics import FREE_FALL, BodyDynamics, flights
-from .centre_of_pressure import extents, lowest_points
 from .contacts import EDGE_CUTOFF, LEAVE_HEIGHT, TOUCH_SPEED, Contacts
-from .load_sharing import whole_body_shares
 from .sliding import treadmill_velocity
 
 Array = NDArray[np.float64]
@@ -54,6 +54,8 @@ SUPPORT_RANGE = 0.08
 """A sole bears while it is within this of its lowest place, in leg lengths."""
 IDLE_LOAD = 0.15
 """A sole that never bears more than this only drags, in body weights."""
+RESTS = 0.5
+"""A sole whose skin rests for more of its contact does not drag."""
 QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
 """Phases at which a sine has a quarter and a half of its peak."""
 
@@ -122,7 +124,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         strike = round(first + weight * (onset - first))
         touching[min(strike, first) : max(strike, first), sole] = strike < first
     load = whole_body_shares(motion, lowest, touching, body) * body.force[:, 2:]
-    return dataclasses.replace(contacts, touching=_without_idle(touching, load))
+    return dataclasses.replace(contacts, touching=_without_idle(touching, load, _resting(motion)))
 
 
 def _rolled_on(touching: NDArray[np.bool_], lifted: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
@@ -135,12 +137,22 @@ def _rolled_on(touching: NDArray[np.bool_], lifted: NDArray[np.bool_], longest: 
     return joined
 
 
-def _without_idle(touching: NDArray[np.bool_], load: Array) -> NDArray[np.bool_]:
-    """Contacts less those whose load (N, S) [body weights] is never worth the name: a foot that drags bears nothing."""
+def _resting(motion: CharacterMotion) -> NDArray[np.bool_]:
+    """When the skin of each sole rests, (N, S); never where that is not seen."""
+    never = np.zeros(len(motion.frames), dtype=bool)
+    return np.stack([never if sole.bears is None else sole.bears for sole in motion.soles], axis=1)
+
+
+def _without_idle(touching: NDArray[np.bool_], load: Array, resting: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Contacts less those whose load (N, S) [body weights] is never worth the name: a foot that drags bears nothing.
+
+    What mostly rests stays: how hard it presses shows in its depth.
+    """
     bearing = touching.copy()
     for sole in range(touching.shape[1]):
         for first, last in zip(*runs(touching[:, sole]), strict=True):
-            bearing[first:last, sole] = load[first:last, sole].max() > IDLE_LOAD
+            rests = resting[first:last, sole].mean() > RESTS
+            bearing[first:last, sole] = rests or load[first:last, sole].max() > IDLE_LOAD
     return np.where(bearing.any(axis=1, keepdims=True), bearing, touching)
 
 

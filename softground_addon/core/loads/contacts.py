@@ -2,7 +2,7 @@
 
 Detection is scale-free: heights are compared as fractions of the leg length and speeds as fractions of
 sqrt(gravity·leg length), so that the same numbers serve a mouse and a giant, metres and centimetres
-(MODEL.md section 3, "Contact").
+(docs/model.md section 3, "Contact").
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import CharacterMotion, SoleMotion
+from ..motion.motion import CharacterMotion
+from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
+from ..numerics.slices import Slices, sliced
 from ..numerics.smoothing_spline import smooth_path
 from ..skin import bearing
 
@@ -103,7 +105,8 @@ class Contacts:
         return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps], aloft)
 
 
-def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
+@sliced
+def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contacts]:
     """Find when each sole touches the terrain, by height and speed with hysteresis.
 
     A contact starts when the sole has come down to where it will stand, and ends when its last landmark accelerates
@@ -121,7 +124,10 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     -------
     Contacts
     """
-    tracks = [_track(sole, motion, terrain) for sole in motion.soles]
+    tracks = []
+    for sole in motion.soles:
+        tracks.append(_track(sole, motion, terrain))
+        yield
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
     seen = _seen_on_skin(motion, terrain, tracks)

@@ -11,13 +11,13 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.body_dynamics import BodyDynamics, body_dynamics
+from ..dynamics.load_sharing import POINT_DEVIATION
 from ..motion.motion import CharacterMotion
 from ..numerics.smoothing_spline import smooth_path
-from .body_dynamics import BodyDynamics, body_dynamics
 from .contacts import Contacts
 from .estimate import CharacterLoads
 from .forces import whole_body_forces
-from .load_sharing import POINT_DEVIATION
 
 Array = NDArray[np.float64]
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from ..dynamics.body_dynamics import body_dynamics
+from ..dynamics.continuation import continued, without_holds
 from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
 from ..motion.motion import CharacterMotion, steps_per_frame
 from ..numerics.slices import Slices, sliced
-from .body_dynamics import body_dynamics
 from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts
-from .continuation import continued, without_holds
 from .forces import ContactForces, impulse_forces, whole_body_forces
 from .free_bodies import free_loads
+from .jumps import FEWEST, joined
+from .missing_ground import beyond_edge, without_missing
 from .sliding import treadmill_speed
 
 ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
@@ -36,7 +38,6 @@ def estimate_loads(
     *,
     force_model: ForceModel,
     material: GroundMaterial,
-    crisp_landings: bool = False,
 ) -> Slices[CharacterLoads]:
     """Resample the motion to the simulation's time grid, find its contacts and estimate its forces.
 
@@ -50,10 +51,17 @@ def estimate_loads(
     material : GroundMaterial
         Its characteristic time shapes the impulse model and the landings of props without a skeleton; the
         whole-body model of a character does not depend on it.
-    crisp_landings : bool
-        See `whole_body_forces`.
     """
     steps = steps_per_frame(motion.frame_rate)
+    if len(motion.starts) > 1:
+        ends, parts = [*motion.starts[1:], len(motion.frames)], []
+        for samples in map(slice, motion.starts, ends):
+            if samples.stop - samples.start >= FEWEST:
+                part = motion.of(samples)
+                work = estimate_loads.slices(part, terrain, force_model=force_model, material=material)
+                loads = yield from work
+                parts.append((samples, loads.contacts, loads.forces))
+        return CharacterLoads(motion.resampled(steps), *joined(motion, parts, steps))
     if motion.centre is not None:
         tau = material.characteristic_time
         return CharacterLoads(
@@ -62,7 +70,8 @@ def estimate_loads(
     source, given = continued(without_holds(motion))
     source = source.resampled(steps)
     yield
-    contacts = detect_contacts(source, terrain)
+    ground = beyond_edge(source, terrain)
+    contacts = yield from detect_contacts.slices(source, ground)
     yield
     if force_model == "IMPULSE" or not motion.joints:  # without joints, nothing tells what the body does
         forces = impulse_forces(source, contacts, material.characteristic_time)
@@ -73,6 +82,8 @@ def estimate_loads(
         if source.ground_level is None or treadmill_speed(source, contacts) == 0:
             contacts = refine_contacts(source, contacts, body)
         yield
-        forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
+        forces = whole_body_forces(source, contacts, body)
+    if ground is not terrain:
+        contacts, forces = without_missing(source, terrain, contacts, forces)
     shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))

@@ -1,6 +1,6 @@
 """Ground reaction forces on the soles of one character.
 
-Two models (MODEL.md section 3): the paper's impulse model, causal, and the whole-body model.
+Two models (docs/model.md section 3): the paper's impulse model, causal, and the whole-body model.
 """
 
 from __future__ import annotations
@@ -12,26 +12,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.body_dynamics import BodyDynamics, body_dynamics, with_flight
+from ..dynamics.centre_of_mass import centre_of_mass
+from ..dynamics.centre_of_pressure import centres_of_pressure, lowest_points
+from ..dynamics.load_sharing import point_of_action, share_by_moment, whole_body_shares
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import runs
-from .body_dynamics import BodyDynamics, body_dynamics, with_flight
-from .centre_of_mass import centre_of_mass
-from .centre_of_pressure import centres_of_pressure, lowest_points
 from .contacts import Contacts
-from .load_sharing import point_of_action, share_by_moment, whole_body_shares
 
 Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
 
-FOOT_FRACTION = 0.08
-"""Mass that stops with a landing foot, of the body mass (Clark, Ryan and Weyand 2017)."""
 RESTING_FRACTION = 0.014
 """Least share of a sole that touches: a foot's own mass, of the body mass (de Leva 1996)."""
 LOWEST_MEETING = 0.5
 """Least height above the ground at which forces meet, in leg lengths: a body that lies presses straight down."""
-IMPACT_TIME = 0.16
-"""Time in which it stops, in sqrt(leg length/gravity) (50 ms for an adult)."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ class ContactForces:
 
 
 def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> ContactForces:
-    """The paper's model, Eq. 3-8 with the corrections 1, 5 and 6 of MODEL.md section 2.
+    """The paper's model, Eq. 3-8 with the corrections 1, 5 and 6 of docs/model.md section 2.
 
     The weight is split by the projection of the centre of mass on the segment between the soles; a sole that lands
     with velocity v into the ground adds share·mass·v/tau from the moment of contact on for tau. Causal: each step
@@ -99,7 +95,6 @@ def whole_body_forces(
     contacts: Contacts,
     body: BodyDynamics | None = None,
     *,
-    crisp_landings: bool = False,
     cutoff_factor: float = 1.0,
 ) -> ContactForces:
     """Forces that accelerate the centre of mass as the motion shows: m·(g + a_com), where something touches.
@@ -112,9 +107,6 @@ def whole_body_forces(
         Of that motion, best after `refine_contacts`.
     body : BodyDynamics, optional
         Of that motion, where it is known already.
-    crisp_landings : bool
-        Give a landing foot's momentum to the ground as fast as it stops, as on hard ground (see `_foot_impacts`);
-        the low-pass spreads it over some tenths of a second.
     cutoff_factor : float
         See `body_dynamics`.
 
@@ -129,16 +121,25 @@ def whole_body_forces(
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
     lowest = lowest_points(motion)
-    share = whole_body_shares(motion, lowest, contacts.touching, body)
+    share = _with_idle(whole_body_shares(motion, lowest, contacts.touching, body), contacts.touching)
     target = point_of_action(motion, lowest, contacts.touching, body)
     pressure = centres_of_pressure(motion, lowest, share, target, np.clip(total[:, 2], 0.0, 1.0))
     forces = body_weight * share[..., None] * total[:, None]
     forces[..., :2] += forces[..., 2:] * _along_legs(motion, body.centre, share, pressure)
-    if crisp_landings:
-        impacts = _foot_impacts(motion, contacts, 1 / (2 * body.cutoff))
-        forces[..., 2] = np.maximum(forces[..., 2] + impacts, 0.0)
     weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)
+
+
+def _with_idle(share: Array, touching: NDArray[np.bool_]) -> Array:
+    """Shares (N, S) in which what touches without any load bears a foot's own mass."""
+    idle = np.zeros_like(touching)
+    for sole in range(touching.shape[1]):
+        for first, last in zip(*runs(touching[:, sole]), strict=True):
+            idle[first:last, sole] = share[first:last, sole].max() < RESTING_FRACTION
+    if not idle.any():
+        return share
+    least = np.where(idle, RESTING_FRACTION, share)
+    return np.asarray(least / np.maximum(least.sum(axis=1, keepdims=True), RESTING_FRACTION))
 
 
 def _along_legs(motion: CharacterMotion, centre: Array, share: Array, pressure: Array) -> Array:
@@ -169,31 +170,6 @@ def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, character
         lasting = np.clip(characteristic_time / step - np.arange(last - first), 0.0, 1.0)
         deceleration[first:last, sole] = speed / characteristic_time * lasting
     return deceleration
-
-
-def _foot_impacts(motion: CharacterMotion, contacts: Contacts, smoothing: float) -> Array:
-    """What a low-pass takes from the impact of landing feet, (N, S) [N]; each impact sums to 0 over time.
-
-    A landing foot and shank, 8 % of the body mass, stop within some 50 ms (Clark, Ryan and Weyand 2017, "A general
-    relationship links gait mechanics and running ground reaction forces", J. Exp. Biology 220). The smooth force holds
-    that momentum already, spread over the time `smoothing` [s]: the same momentum is taken there and given as a
-    raised cosine over the time that the foot takes to stop.
-    """
-    step = motion.time_step
-    impacts = np.zeros(contacts.touching.shape)
-    duration = IMPACT_TIME * motion.pendulum_time
-    for sole, first, last, speed in _landings(motion, contacts):
-        momentum = FOOT_FRACTION * motion.mass * speed
-        time = (np.arange(last - first) + 0.5) * step
-        crisp, smooth = (_raised_cosine(time, width) for width in (duration, duration + 2 * smoothing))
-        if crisp.sum() > 0:
-            impacts[first:last, sole] = momentum / step * (crisp / crisp.sum() - smooth / smooth.sum())
-    return impacts
-
-
-def _raised_cosine(time: Array, width: float) -> Array:
-    """A smooth pulse from 0 to `width`."""
-    return np.where(time < width, 1 - np.cos(2 * np.pi * time / width), 0.0)
 
 
 def _landings(motion: CharacterMotion, contacts: Contacts) -> Iterator[tuple[int, int, int, float]]:

@@ -14,14 +14,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.load_sharing import share_by_moment
 from ..ground.heightfield import Terrain
-from ..motion.motion import CharacterMotion, SoleMotion
+from ..motion.motion import CharacterMotion
 from ..motion.props import posed
+from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import linear
 from ..numerics.intervals import hysteresis, runs
 from .contacts import Contacts, ground_normal
 from .forces import UP, ContactForces
-from .load_sharing import share_by_moment
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

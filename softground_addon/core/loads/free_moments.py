@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.body_dynamics import body_dynamics
+from ..dynamics.centre_of_mass import trunk_spin
+from ..dynamics.continuation import continued
 from ..numerics.smoothing_spline import smooth_path
-from .body_dynamics import body_dynamics
-from .centre_of_mass import trunk_spin
-from .continuation import continued
 from .estimate import CharacterLoads
 
 Array = NDArray[np.float64]

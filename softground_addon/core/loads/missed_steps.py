@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..findings import Finding
-from ..motion.motion import CharacterMotion, SoleMotion
+from ..motion.motion import CharacterMotion
+from ..motion.sole_motion import SoleMotion
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
 from .sliding import treadmill_velocity

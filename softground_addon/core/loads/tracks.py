@@ -43,7 +43,7 @@ def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
             pieces = min(np.ceil(slide / furthest), (end - first) // shortest)
             limit = slide / pieces if pieces > 1 else np.inf
         begin = int(first)
-        for step in range(begin + 1, int(end)):
+        for step in range(begin + 1, int(end)) if limit < np.inf else ():
             if np.linalg.norm(place[step] - place[begin]) > limit:
                 yield slice(begin, step)
                 begin = step

@@ -24,7 +24,7 @@ from .region import Region
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Numbers = NDArray[np.int32]
-"""Of vertices, edges and triangles, of which meshes hold no more either: there are many while they are cut."""
+"""Numbers of vertices, edges and triangles, as wide as in meshes: there are many while they are cut."""
 Mask = NDArray[np.bool_]
 
 AT_ONCE = 1 << 16
@@ -60,8 +60,8 @@ def _stacked(*parts: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
     return [np.stack(part, axis=1) for part in parts]
 
 
-def _counted(many: int, first: int = 0) -> Numbers:
-    return np.arange(first, first + many, dtype=np.int32)
+def _counted(count: int, first: int = 0) -> Numbers:
+    return np.arange(first, first + count, dtype=np.int32)
 
 
 class Bisection:
@@ -69,7 +69,7 @@ class Bisection:
 
     Edge k of a triangle lies opposite its corner k. A cut edge has two halves, which end in its middle; the first is at
     its first end. The weights of a corner are its barycentric coordinates in the given triangle that it lies in: there
-    is an array for each of that triangle's first two corners, and the third's are what is left of 1.
+    is an array for each of that triangle's first two corners, and the third's are the remainder to 1.
 
     Attributes
     ----------
@@ -136,13 +136,13 @@ class Bisection:
                 return
             marked = np.zeros(len(self.ends), dtype=bool)
             marked[self.edge[wanted, 0]] = True
+            yield
             self._close(marked)
             self._cut_edges(np.flatnonzero(marked))
-            fresh = self._cut_triangles()
-            yield
+            fresh = yield from self._cut_triangles()
 
     def _wanted(self, triangles: Numbers, region: Region, leg: float) -> Numbers:
-        """Those triangles that are too large and reach into the region."""
+        """Triangles that are too large and reach into the region."""
         long = triangles[longest_sides(self.points, self.corner[triangles]) > leg * np.sqrt(2)]
         place = self.points[self.corner[long], :2]
         return long[region.touches(place.min(axis=1), place.max(axis=1))]
@@ -169,11 +169,12 @@ class Bisection:
         self.half = np.concatenate([self.half, np.full(len(ends), -1, dtype=np.int32)])
         return added
 
-    def _cut_triangles(self) -> Numbers:
+    def _cut_triangles(self) -> Slices[Numbers]:
         """Cut every triangle whose base is cut, and again where a part's base is; returns the parts."""
         is_part = np.zeros(len(self.corner), dtype=bool)
         candidates = _counted(len(self.corner))
         while True:
+            yield
             cut = candidates[self.half[self.edge[candidates, 0]] >= 0]
             if not len(cut):
                 return np.flatnonzero(is_part).astype(np.int32)

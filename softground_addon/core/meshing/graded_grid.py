@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..numerics.cell_keys import AROUND, Keys, among, cells_of, keys_of, parents_of
+from ..numerics.cell_keys import AROUND, Keys, among, cells_of, keys_of, merged, parents_of
+from ..numerics.slices import Slices, sliced
 
 Indices = NDArray[np.intp]
 
-_CORNERS = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+_CORNERS = keys_of(np.array([(0, 0), (1, 0), (1, 1), (0, 1)]))
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,10 @@ class Blocks:
         return parents_of(blocks) if self.level == self.size else blocks
 
 
+@sliced
 def graded_grid(
     fine: Indices, level: int, lower: Indices, upper: Indices, coarsest: int, coarser: Blocks | None = None
-) -> GradedGrid:
+) -> Slices[GradedGrid]:
     """Fill a rectangle with squares that are one cell large in given blocks and grow with the distance from them.
 
     Parameters
@@ -96,49 +98,55 @@ def graded_grid(
     count = np.maximum(-(-upper // side) - lower // side, 1)
     kinds = [Blocks(np.asarray(fine), level, 0), *([coarser] if coarser else [])]
     inside = [replace(kind, place=kind.place - origin // (1 << kind.level)) for kind in kinds]
-    cut = _cut_blocks(inside, count, coarsest)
+    cut = yield from _cut_blocks(inside, count, coarsest)
     blocks = keys_of(np.stack(np.meshgrid(*map(np.arange, count)), axis=-1)).ravel()
     place, size = [], []
     for number in range(coarsest, -1, -1):
+        yield
         whole = ~among(cut.get(number, blocks[:0]), blocks)
-        place.append(cells_of(blocks[whole]) << number)
+        place.append(blocks[whole] << number)
         size.append(np.full(len(place[-1]), 1 << number))
         blocks = _quarters(blocks[~whole])
-    return _polygons(np.concatenate(place), np.concatenate(size), origin)
+    return (yield from _polygons(np.concatenate(place), np.concatenate(size), origin))
 
 
-def _cut_blocks(kinds: Sequence[Blocks], count: Indices, coarsest: int) -> dict[int, Keys]:
+def _cut_blocks(kinds: Sequence[Blocks], count: Indices, coarsest: int) -> Slices[dict[int, Keys]]:
     """Keys of the blocks that are cut in four, by level: those above a fine one, and what keeps the sizes balanced."""
     blocks = np.zeros(0, dtype=np.int64)
     cut = {}
     for number in range(1, coarsest + 1):
         for kind in kinds:
             if kind.size + 1 == number:
-                blocks = np.union1d(blocks, kind.parents(count, coarsest))
+                yield
+                blocks = merged(blocks, kind.parents(count, coarsest))
+        yield
         cut[number] = blocks
-        around = cells_of(np.unique(blocks[:, None] + AROUND))
+        around = cells_of(merged(*(blocks + step for step in AROUND)))
         inside = ((around >= 0) & (around < count << coarsest - number)).all(axis=1)
         blocks = parents_of(keys_of(around[inside]))
     return cut
 
 
 def _quarters(blocks: Keys) -> Keys:
-    return np.sort((2 * blocks[:, None] + keys_of(_CORNERS)).ravel())
+    return merged(*(2 * blocks + corner for corner in _CORNERS))
 
 
-def _polygons(place: Keys, size: Keys, origin: Indices) -> GradedGrid:
-    """Squares at given first corners (P, 2) with given sides as polygons with all vertices that lie on their sides."""
-    corners = place[:, None] + size[:, None, None] * _CORNERS
-    keys = keys_of(corners)
-    vertices = np.unique(keys)
-    large = np.flatnonzero(size > 1)
-    middles = keys_of((corners[large] + np.roll(corners[large], -1, axis=1)) // 2)
-    outline = np.full((len(place), 8), -1, dtype=np.int64)
-    outline[:, ::2] = keys
-    outline[large, 1::2] = np.where(among(vertices, middles), middles, -1)
-    on_it = outline >= 0
-    return GradedGrid(
-        vertices=(cells_of(vertices) + origin).astype(np.intp),
-        corner_vertex=np.searchsorted(vertices, outline[on_it]),
-        face_size=on_it.sum(axis=1),
-    )
+def _polygons(place: Keys, size: Keys, origin: Indices) -> Slices[GradedGrid]:
+    """Squares with given first corners (P,) and sides as polygons with all vertices that lie on their sides."""
+    corners, vertices = [place + size * corner for corner in _CORNERS], place[:0]
+    for corner in corners:
+        yield
+        vertices = merged(vertices, corner)
+    large, face_size = np.flatnonzero(size > 1), np.full(len(place), 4)
+    outline = np.full((len(place), 8), -1, dtype=np.intp)
+    for number, corner in enumerate(corners):
+        yield
+        outline[:, 2 * number] = np.searchsorted(vertices, corner)
+        middles = (corner[large] + corners[number - 3][large]) // 2
+        divided = among(vertices, middles)
+        outline[large[divided], 2 * number + 1] = np.searchsorted(vertices, middles[divided])
+        face_size[large] += divided
+    yield
+    corner_vertex = outline[outline >= 0]
+    yield
+    return GradedGrid((cells_of(vertices) + origin).astype(np.intp), corner_vertex, face_size)

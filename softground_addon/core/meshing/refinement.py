@@ -33,7 +33,7 @@ EQUAL_PARTS = (1, 3, 5, 7, 9, 11, 13)
 """Pieces that edges are cut into. Even numbers come to the same as halving; up to 13, halving ends within 4 % of a
 cell."""
 FINEST_GRAIN = 2.0**-14
-"""Of the parts, in lengths of an edge."""
+"""Shortest part, in lengths of an edge."""
 WEIGHT_BITS = 24
 """Bits of a weight in single precision: those of the grain and of the halvings are all that there are."""
 LEAST_PART = 8.0
@@ -75,7 +75,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Refinement:
-    """What becomes of a surface: some of its faces are kept, the others become quads and triangles.
+    """Refinement of a surface: some of its faces are kept, the others become quads and triangles.
 
     Attributes
     ----------
@@ -89,8 +89,8 @@ class Refinement:
     source : (N,) int array
         Triangle of the surface that each new face lies in.
     weights : (L, 2) float32 array
-        Barycentric coordinates of each corner in that triangle, of its first two corners; the third's are what is left
-        of 1.
+        Barycentric coordinates of each corner in that triangle, of its first two corners; the third's are the remainder
+        to 1.
     new_vertex : (M,) int array
         The corner at which each new vertex occurs first.
     edges : (E, 2) int array
@@ -116,9 +116,9 @@ class Refinement:
         source, weights = self._corner_source()[self.new_vertex], self.weights[self.new_vertex]
         return _continued(values, values, surface.triangle_vertices, source, weights)
 
-    def at_corners(self, surface: Surface, values: NDArray[Any], kept: Indices) -> NDArray[Any]:
+    def at_corners(self, surface: Surface, values: NDArray[Any], corners: Indices) -> NDArray[Any]:
         """Values at kept corners of the surface, and behind them at those of the new faces, (C + L, ...)."""
-        return _continued(values[kept], values, surface.triangle_corners, self._corner_source(), self.weights)
+        return _continued(values[corners], values, surface.triangle_corners, self._corner_source(), self.weights)
 
     def _corner_source(self) -> Numbers:
         """Triangle of the surface that each corner's face lies in, (L,)."""
@@ -183,7 +183,7 @@ def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinemen
 
 
 def _equal_parts(surface: Surface, wanted: Indices, spacing: float) -> tuple[int, float]:
-    """Into how many pieces to cut the edges of a surface before its wanted triangles, (N, 3), are halved; the grain."""
+    """Pieces that the edges of a surface are cut in before its wanted triangles, (N, 3), are halved; the grain."""
     if not 0 < len(wanted) <= len(surface.triangle_face) <= FEW_TRIANGLES:
         return 1, 1.0
     leg = float(np.median(longest_sides(surface.vertices, wanted))) / np.sqrt(2) / spacing
@@ -196,8 +196,8 @@ def _equal_parts(surface: Surface, wanted: Indices, spacing: float) -> tuple[int
 def _faces_at(surface: Surface, triangle_vertices: Indices, region: Region, leg: float) -> Mask:
     """Faces that are too large and reach into the region, with all faces that share a vertex with them."""
     place = surface.vertices[:, :2]
-    corners = place[triangle_vertices]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    corners = [place[corner] for corner in triangle_vertices.T]
+    low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
     wanted = region.touches(low, high)
     wanted[wanted] = longest_sides(surface.vertices, triangle_vertices[wanted]) > leg * np.sqrt(2)
     touched = np.zeros(len(place), dtype=bool)
@@ -217,10 +217,10 @@ def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
     owner, within = enumerated(count)
     face = near[owner]
     first = surface.face_start[face]
-    here = surface.corner_vertex[first + within]
-    there = surface.corner_vertex[first + (within + 1) % count[owner]]
+    start = surface.corner_vertex[first + within]
+    end = surface.corner_vertex[first + (within + 1) % count[owner]]
     size = len(surface.vertices)
-    keys = np.minimum(here, there) * size + np.maximum(here, there)
+    keys = np.minimum(start, end) * size + np.maximum(start, end)
     faces[face[np.isin(keys, edges[:, 0] * size + edges[:, 1])]] = True
     return faces
 

@@ -1,11 +1,11 @@
-"""Where detail is wanted on the plane."""
+"""Region of the plane where detail is wanted."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..numerics.cell_keys import Keys, among, keys_of, parents_of
+from ..numerics.cell_keys import Keys, among, cells_of, keys_of, parents_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,7 +27,7 @@ class Region:
         self._levels = [cells]
 
     def touches(self, low: Array, high: Array) -> Mask:
-        """Which of the boxes from `low` to `high`, (N, 2) [m], reach into the region, to about a cell."""
+        """True for boxes from `low` to `high`, (N, 2) [m], that reach into the region, to about a cell."""
         if not len(self._levels[0]):
             return np.zeros(len(low), dtype=bool)
         extent = (high - low).max(axis=1) / (2 * self.cell_size)
@@ -37,14 +37,18 @@ class Region:
             boxes = np.flatnonzero(level == number)
             size = self.cell_size * 2.0**number
             first, last = (np.floor(corner[boxes] / size).astype(np.int64) for corner in (low, high))
-            found = np.zeros(len(boxes), dtype=bool)
+            cells = cells_of(self._at(int(number)))
+            near = ((last >= cells.min(axis=0)) & (first <= cells.max(axis=0))).all(axis=1)
+            boxes, first, last = boxes[near], first[near], last[near]
+            reached = np.zeros(len(boxes), dtype=bool)
             for row in (first[:, 1], (first[:, 1] + last[:, 1]) // 2, last[:, 1]):
                 for column in (first[:, 0], (first[:, 0] + last[:, 0]) // 2, last[:, 0]):
-                    found |= self._holds(keys_of(np.stack([column, row], axis=-1)), int(number))
-            touched[boxes] = found
+                    reached |= among(self._at(int(number)), keys_of(np.stack([column, row], axis=-1)))
+            touched[boxes] = reached
         return touched
 
-    def _holds(self, cells: Keys, level: int) -> Mask:
+    def _at(self, level: int) -> Keys:
+        """The cells of the pyramid's level."""
         while len(self._levels) <= level:
             self._levels.append(parents_of(self._levels[-1]))
-        return among(self._levels[level], cells)
+        return self._levels[level]

@@ -1,4 +1,4 @@
-"""Where each pixel of a UV map lies in the world."""
+"""World position of each pixel of a UV map."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def rasterise(uv: Array, place: Array, width: int, height: int) -> Pixels:
     high = np.clip(np.floor(corner.max(axis=1) + 1e-9) + 1, 0, size).astype(np.intp)
     span = np.maximum(high - low, 0)
     counts = span.prod(axis=1)
-    some = np.flatnonzero(counts)
+    covering = np.flatnonzero(counts)
     index, position = [np.zeros(0, dtype=np.intp)], [np.zeros((0, place.shape[-1]))]
-    batch = np.cumsum(counts[some]) // PAIRS_AT_ONCE
+    batch = np.cumsum(counts[covering]) // PAIRS_AT_ONCE
     for number in np.unique(batch):
-        chosen = some[batch == number]
+        chosen = covering[batch == number]
         owner, within = enumerated(counts[chosen])
         triangle = chosen[owner]
         row, column = np.divmod(within, span[triangle, 0])

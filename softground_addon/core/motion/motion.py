@@ -7,17 +7,17 @@ This is the border between Blender and the physics. Everything that the core kno
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..numerics.interpolation import Between, cubic, in_stretches, linear, turning
-from .props import Prop
+from ..numerics.interpolation import cubic, linear
+from .sole_motion import SoleMotion, _between, shortest_length
+from .units import scale_to_metres
 
 Array = NDArray[np.float64]
 
@@ -30,176 +30,24 @@ STILL = 1e-6
 ADULT_LEG = 0.9
 """Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
 
-TALLEST, SMALLEST = 20.0, 0.05
-"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, little is smaller."""
 
-COARSER = 4.0
-"""How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
-be as it says."""
+JUMP = 0.25
+"""A body that moves farther between two frames may jump, in leg lengths, ..."""
+
+JUMPS_AHEAD = 6.0
+"""... if that is so many times as far as between any other two frames nearby, ..."""
+
+AROUND_JUMP = 0.25
+"""... as long before and after: keys on threes at 12 frames a second are poses that are held, each [s]."""
+
 
 _LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
 
 JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
 """Names that `CharacterMotion.joints` may hold. `toe` is the tip of the foot; any may be missing."""
 
-
-def scale_to_metres(size: float) -> float:
-    """Factor that a body of such a size [m] lacks: 0.01 where its file is in centimetres, 100 the reverse, or 1."""
-    return 0.01 if size > TALLEST else 100.0 if 0 < size < SMALLEST else 1.0
-
-
-def shortest_length(lengths: Iterable[float]) -> float:
-    """Length of the shortest of some soles by which cells are sized [m]: a fingertip beside a trunk sizes none.
-
-    Examples
-    --------
-    >>> shortest_length([0.27, 0.19]), shortest_length([0.4, 0.003])
-    (0.19, 0.1)
-    """
-    known = list(lengths)
-    return max(min(known), max(known) / COARSER)
-
-
-@dataclass(frozen=True)
-class SolePatch:
-    """The underside of one rigid piece of a sole, as two maps over a regular grid.
-
-    The patch frame has x toward the toes, y left and z up when the foot is planted, with z = 0 at the underside's
-    lowest point. Node (row, column) of a map is at x = origin[0] + column·spacing, y = origin[1] + row·spacing.
-
-    Attributes
-    ----------
-    heights : (rows, columns) float array
-        Height of the underside in the patch frame [m], continued smoothly outside the outline.
-    signed_distance : (rows, columns) float array
-        Distance to the patch's outline [m], negative inside.
-    origin : (2,) float array
-        Position of node (0, 0) [m].
-    spacing : float
-        Distance between nodes [m].
-    """
-
-    heights: Array
-    signed_distance: Array
-    origin: Array
-    spacing: float
-
-    @property
-    def area(self) -> float:
-        """Area inside the outline [m²], with edge nodes counted by their covered fraction."""
-        return float(np.clip(0.5 - self.signed_distance / self.spacing, 0.0, 1.0).sum() * self.spacing**2)
-
-
-@dataclass(frozen=True)
-class Sole:
-    """One contact shape: a foot, a hand, a snowshoe.
-
-    Attributes
-    ----------
-    name : str
-        What the user sees, e.g. "foot.L".
-    side : str
-        "L", "R" or "" for neither.
-    patches : tuple of SolePatch
-        Rigid pieces from back to front, e.g. (foot, toes); their seams overlap a little, so that a bend leaves no gap.
-    landmarks : (L, 3) float array
-        Points of the underside that contact detection follows, from back to front (heel, ball, toe tip) [m], each in
-        the frame of its patch.
-    landmark_patch : (L,) int array
-        Index of the patch that each landmark belongs to.
-    outline : (N, 2) float array
-        The flat sole's outline in the frame of the first patch [m], counter-clockwise, for drawing.
-    prop : Prop or None
-        The whole surface, in place of patches, of what prints by whatever faces down; its frame is that of the one
-        pose that it has.
-    underside : (N, M) float array or None
-        Heights of the flat sole's mesh from heel to toes and from left to right [m], infinite where there is none;
-        None where it is of no mesh.
-    bend : float
-        How far behind and before the seam of two pieces the skin moves with both [m].
-    """
-
-    name: str
-    side: str
-    patches: tuple[SolePatch, ...]
-    landmarks: Array
-    landmark_patch: NDArray[np.intp]
-    outline: Array
-    prop: Prop | None = None
-    underside: Array | None = None
-    bend: float = 0.0
-
-    @property
-    def area(self) -> float:
-        """Area of the flat sole [m²], from its outline (shoelace formula)."""
-        x, y = self.outline.T
-        return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
-
-    @property
-    def length(self) -> float:
-        """Length of the flat sole from heel to toe tip [m]."""
-        return float(np.ptp(self.outline[:, 0]))
-
-    @property
-    def breadth(self) -> float:
-        """Breadth of the flat sole from side to side [m]."""
-        return float(np.ptp(self.outline[:, 1]))
-
-
-@dataclass(frozen=True)
-class SoleMotion:
-    """A sole and the rigid pose of each of its patches over time.
-
-    Attributes
-    ----------
-    sole : Sole
-    transforms : (F, P, 4, 4) float array
-        Patch frame to world, rotation and translation only [m]; of the one frame of a prop.
-    bears : (F,) bool array or None
-        When the skin under it bears on level ground, where that was seen.
-    """
-
-    sole: Sole
-    transforms: Array
-    bears: NDArray[np.bool_] | None = None
-
-    def landmark_positions(self) -> Array:
-        """World positions of the sole's landmarks, (F, L, 3) [m]; worked out once, not to be written to."""
-        return self._landmark_positions
-
-    @cached_property
-    def _landmark_positions(self) -> Array:
-        patch, (x, y, z) = self.sole.landmark_patch, self.sole.landmarks.T[..., None]
-
-        def during(steps: slice) -> Array:
-            pose = self.transforms[steps][:, patch, :3]
-            return np.asarray(pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3])
-
-        positions = in_stretches(during, len(self.transforms))
-        positions.flags.writeable = False
-        return positions
-
-    def lowest(self) -> Array:
-        """Height of the sole's lowest point, (F,) [m]; of a foot, of its lowest landmark."""
-        if self.sole.prop is None:
-            return np.asarray(self.landmark_positions()[..., 2].min(axis=1))
-        pose = self.transforms[:, 0]
-        return np.asarray((pose[:, 2, :3] @ self.sole.prop.probes.T).min(axis=1) + pose[:, 2, 3])
-
-    def at(self, position: Array) -> SoleMotion:
-        """The motion at fractional sample indices (K,), those of its samples exactly.
-
-        Between samples a foot moves along a C1 cubic; a prop turns evenly about the shortest way and moves straight,
-        so that what rolls keeps its shape and what stops at once does not swing past.
-        """
-        method = turning if self.sole.prop else _rigid_cubic
-        bears = None if self.bears is None else self.bears[np.rint(position).astype(np.intp)]
-        return dataclasses.replace(self, transforms=_between(self.transforms, position, method), bears=bears)
-
-    def of(self, samples: slice | NDArray[np.bool_]) -> SoleMotion:
-        """Some of the samples."""
-        bears = None if self.bears is None else self.bears[samples]
-        return dataclasses.replace(self, transforms=self.transforms[samples], bears=bears)
+CENTRE = "centre"
+"""Beside these, the middle of the body's volume, where nothing else tells where its upper half is."""
 
 
 @dataclass(frozen=True)
@@ -248,7 +96,7 @@ class CharacterMotion:
         Scene frames per second [Hz].
     soles : tuple of SoleMotion
     joints : dict of str to (F, 3) float array
-        World positions of those of `JOINTS` that are mapped [m].
+        World positions of those of `JOINTS` that are mapped, and of `CENTRE` [m].
     gravity : float
         Magnitude of gravity [m/s²].
     centre : (F, 3) float array or None
@@ -260,6 +108,10 @@ class CharacterMotion:
         Height at which its skin rests on level ground [m], where that was seen.
     skin : LowSkin or None
         Where its skin is lowest, at the frames that were read.
+    stature : float
+        Height of its bones at rest [m], or a third of their length if it is low; 0 without a rig.
+    bones_move : bool
+        True if some bone that was read moves, though it may carry no joint and no sole: a head that nods.
     """
 
     name: str
@@ -274,6 +126,8 @@ class CharacterMotion:
     four_legged: bool = False
     ground_level: float | None = None
     skin: LowSkin | None = None
+    stature: float = 0.0
+    bones_move: bool = False
 
     @property
     def times(self) -> Array:
@@ -287,12 +141,14 @@ class CharacterMotion:
 
     @property
     def fall(self) -> float:
-        """Gravity in the units of its file, as its skin tells them [m/s²]: a file in centimetres moves as in metres."""
-        return self.gravity / (scale_to_metres(self.skin.height) if self.skin else 1.0)
+        """Gravity in the units of its file, as its stature tells them [m/s²]: one in centimetres moves as in metres."""
+        return self.gravity / scale_to_metres(self.stature)
 
     @property
     def stands_still(self) -> bool:
-        """Whether no joint and no sole moves from sample to sample."""
+        """True if no bone, no joint and no sole moves from sample to sample."""
+        if self.bones_move:
+            return False
         paths = (*self.joints.values(), *(sole.transforms for sole in self.soles))
         return all(np.allclose(path, path[:1], rtol=0.0, atol=STILL * self.leg_length) for path in paths)
 
@@ -337,6 +193,22 @@ class CharacterMotion:
         """Time between the samples at scene frames [s]."""
         return dataclasses.replace(self, frames=self.frames[self.on_frames]).time_step
 
+    @cached_property
+    def starts(self) -> NDArray[np.intp]:
+        """The first sample, and the first after each jump: a cut or a constant key has put the body elsewhere.
+
+        Nothing is known of what lies between it and the sample before.
+        """
+        if len(self.frames) < 2:
+            return np.zeros(1, dtype=np.intp)
+        paths = [*self.joints.values(), *(sole.transforms[:, 0, :3, 3] for sole in self.soles)]
+        around = max(round(AROUND_JUMP / self.time_step), 1)
+        moved = np.median([np.linalg.norm(np.diff(path, axis=0), axis=-1) for path in paths], axis=0)
+        beside = np.lib.stride_tricks.sliding_window_view(np.pad(moved, around), 2 * around + 1)
+        nearby = np.delete(beside, around, axis=1).max(axis=1)
+        jumps = moved > np.maximum(JUMP * self.leg_length, JUMPS_AHEAD * nearby)
+        return np.append(0, np.flatnonzero(jumps) + 1)
+
     def at_frames(self) -> CharacterMotion:
         """The samples at scene frames alone."""
         return self.of(self.on_frames)
@@ -345,7 +217,7 @@ class CharacterMotion:
         """The first `count` samples."""
         return self.of(slice(count))
 
-    def of(self, samples: slice | NDArray[np.bool_]) -> CharacterMotion:
+    def of(self, samples: slice | NDArray[np.bool_] | NDArray[np.intp]) -> CharacterMotion:
         """Some of the samples."""
         return dataclasses.replace(
             self,
@@ -358,44 +230,29 @@ class CharacterMotion:
     def resampled(self, steps_per_frame: int) -> CharacterMotion:
         """The same motion with `steps_per_frame` samples per frame, through C1 cubic interpolation.
 
-        The first sample of each frame is the given one, exactly.
+        The first sample of each frame is the given one, exactly. Between a jump and the frame before is the pose after.
         """
         if steps_per_frame == 1 or len(self.frames) < 2:
             return self
-        count = (len(self.frames) - 1) * steps_per_frame + 1
+        count, jumps = (len(self.frames) - 1) * steps_per_frame + 1, self.starts[1:]
         position = np.arange(count) / steps_per_frame
+        source, at = self, position
+        if len(jumps):  # poses beside a jump come twice, so that no cubic sees beyond it
+            source = self.of(np.sort(np.concatenate([np.arange(len(self.frames)), jumps - 1, jumps])))
+            part = np.searchsorted(self.starts - 1, position) - 1
+            at = np.maximum(position, self.starts[part]) + 2 * part
         return dataclasses.replace(
             self,
             frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
-            soles=tuple(sole.at(position) for sole in self.soles),
-            joints={name: _between(path, position, cubic) for name, path in self.joints.items()},
-            centre=None if self.centre is None else linear(self.centre, position),
+            soles=tuple(sole.at(at) for sole in source.soles),
+            joints={name: _between(path, at, cubic) for name, path in source.joints.items()},
+            centre=None if source.centre is None else linear(source.centre, at),
         )
 
 
 def steps_per_frame(frame_rate: float) -> int:
     """Number of simulation steps in a frame, so that a step is at most 1/`SIMULATION_RATE` s long."""
     return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
-
-
-def _between(samples: Array, position: Array, method: Callable[[Array, Array], Array]) -> Array:
-    """Samples at positions between them, for all who look at them an array."""
-    return cast(Array, Between(samples, position, method))
-
-
-def _rigid_cubic(poses: Array, position: Array) -> Array:
-    """Rigid poses along cubics."""
-    return orthonormal(cubic(poses, position))
-
-
-def orthonormal(transforms: Array) -> Array:
-    """Nearly rigid transforms made rigid: one Newton step of the polar decomposition."""
-    rotation = transforms[..., :3, :3]
-    gram = np.swapaxes(rotation, -1, -2) @ rotation
-    rigid = transforms.copy()
-    rigid[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
-    rigid[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
-    return rigid
 
 
 def shortest_sole(motions: Sequence[CharacterMotion]) -> float:

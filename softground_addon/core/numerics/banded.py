@@ -104,9 +104,9 @@ def _eliminate(matrix: Array, right: Array) -> Array:
     return solution
 
 
-def _product(left: Array, right: Array) -> Array:
+def _product(matrix: Array, right: Array) -> Array:
     """Matrix products of (K, K, M) and (K, C, M)."""
-    product: Array = left[:, 0, None] * right[0]
+    product: Array = matrix[:, 0, None] * right[0]
     for j in range(1, len(right)):
-        product += left[:, j, None] * right[j]
+        product += matrix[:, j, None] * right[j]
     return product

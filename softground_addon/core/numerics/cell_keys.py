@@ -20,7 +20,7 @@ def keys_of(cells: NDArray[np.integer]) -> Keys:
 
 def cells_of(keys: Keys) -> Keys:
     """Column and row of each key, (..., 2)."""
-    row = (keys + ROW // 2) // ROW
+    row = (keys + ROW // 2) >> 32  # several times faster than a division
     return np.stack([keys - row * ROW, row], axis=-1)
 
 
@@ -39,12 +39,18 @@ def parents_of(keys: Keys) -> Keys:
     return np.unique(keys_of(cells_of(keys) >> 1))
 
 
+def merged(*ascending: Keys) -> Keys:
+    """The keys of arrays that ascend, or nearly so, each once and ascending."""
+    keys = np.sort(np.concatenate(ascending), kind="stable")  # merges what ascends already
+    return np.concatenate([keys[:1], keys[1:][keys[1:] != keys[:-1]]])
+
+
 def among(known: Keys, wanted: Keys) -> NDArray[np.bool_]:
-    """Which of the wanted keys are among the known ones, which ascend."""
+    """True for each wanted key that is among the known ones, which ascend."""
     if not len(known):
         return np.zeros(wanted.shape, dtype=bool)
     return np.asarray(known[np.minimum(np.searchsorted(known, wanted), len(known) - 1)] == wanted)
 
 
 AROUND = keys_of(np.array([(column, row) for row in (-1, 0, 1) for column in (-1, 0, 1)]))
-"""What leads from a key to its own and to those of the eight cells around."""
+"""Differences from a key to itself and to the keys of the eight cells around."""

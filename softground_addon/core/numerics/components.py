@@ -1,4 +1,4 @@
-"""What hangs together: connected components of a graph."""
+"""Connected components of a graph."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 Indices = NDArray[np.intp]
 
 
-def components(count: int, one: Indices, other: Indices) -> Indices:
-    """Number of the component that each of `count` nodes is in, from 0 on, where `one` and `other` (L,) are linked.
+def components(count: int, node: Indices, other: Indices) -> Indices:
+    """Number of the component that each of `count` nodes is in, from 0 on, where `node` and `other` (L,) are linked.
 
     Examples
     --------
@@ -18,9 +18,9 @@ def components(count: int, one: Indices, other: Indices) -> Indices:
     """
     label = np.arange(count)
     while True:
-        lower = np.minimum(label[one], label[other])
+        lower = np.minimum(label[node], label[other])
         known = label.copy()
-        for end in (one, other):
+        for end in (node, other):
             np.minimum.at(label, label[end], lower)
         label = label[label]  # a node of a label is in that label's own component
         if (label == known).all():

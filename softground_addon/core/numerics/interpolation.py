@@ -1,4 +1,4 @@
-"""What lies between samples: straight lines, C1 cubics, and rigid poses that turn evenly.
+"""Values between samples: straight lines, C1 cubics, and rigid poses that turn evenly.
 
 Positions are given in samples: 2.25 is a quarter of the way from sample 2 to sample 3.
 """
@@ -17,11 +17,11 @@ from .rigid import rotation
 Array = NDArray[np.float64]
 
 STRETCH = 512
-"""Samples that are worked out in one go: few enough that what lies between the steps of a formula takes no memory."""
+"""Samples computed at once: few enough that the intermediate arrays of a formula take little memory."""
 
 
 class Between(np.lib.mixins.NDArrayOperatorsMixin):
-    """Samples (F, ...) seen at positions between them: an array (K, ...) that is worked out where it is looked at.
+    """Samples (F, ...) seen at positions between them: an array (K, ...) that is computed on access.
 
     A shot at the simulation's time grid takes many times the memory of its frames, and most of it is looked at for a
     few steps at a time.
@@ -32,8 +32,8 @@ class Between(np.lib.mixins.NDArrayOperatorsMixin):
         At least 2.
     position : (K,) float array
     method : callable
-        What lies between samples: takes these and positions. It looks at the two samples beside a position and at the
-        neighbours of these, no further.
+        Interpolates: takes samples and positions. It looks at the two samples beside a position and at the neighbours
+        of these, no further.
     """
 
     def __init__(self, samples: Array, position: Array, method: Callable[[Array, Array], Array]) -> None:
@@ -60,7 +60,7 @@ class Between(np.lib.mixins.NDArrayOperatorsMixin):
         position = self._position[steps]
         if position.ndim == 0:
             return self._at(position[None])[0][tuple(others)]
-        return in_stretches(lambda some: self._at(position[some])[(slice(None), *others)], len(position))
+        return in_stretches(lambda stretch: self._at(position[stretch])[(slice(None), *others)], len(position))
 
     def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)
@@ -79,7 +79,7 @@ class Between(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 def in_stretches(work: Callable[[slice], Array], count: int) -> Array:
-    """What `work` gives for slices of `count` samples, (count, ...): stretch by stretch, which bounds its memory."""
+    """Results of `work` for `count` samples, (count, ...), computed stretch by stretch, which bounds its memory."""
     first = work(slice(0, STRETCH))
     if count <= STRETCH:
         return first
@@ -106,7 +106,7 @@ def cubic(samples: Array, position: Array, places: Array | None = None) -> Array
     position : (K,) float array
         Between the first place and the last.
     places : (F,) float array, optional
-        Where the samples are, ascending; by default at 0, 1, 2 and so on (Catmull-Rom).
+        Positions of the samples, ascending; by default at 0, 1, 2 and so on (Catmull-Rom).
     """
     if len(samples) < 2:
         return np.repeat(samples, len(position), axis=0)
@@ -139,7 +139,7 @@ def turning(poses: Array, position: Array) -> Array:
 
 
 def _span(count: int, position: Array) -> tuple[NDArray[np.intp], Array]:
-    """The sample before each position, and how far the position is from it to the next."""
+    """The sample before each position, and the fraction of the way from it to the next."""
     index = np.clip(np.floor(position).astype(int), 0, max(count - 2, 0))
     return index, position - index
 

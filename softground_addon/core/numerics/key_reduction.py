@@ -1,4 +1,4 @@
-"""Which samples of curves are needed, so that straight lines between them stay within a tolerance (Douglas-Peucker).
+"""Fewest samples of curves between which straight lines stay within a tolerance (Douglas-Peucker).
 
 References
 ----------
@@ -57,10 +57,10 @@ def bend_lines(frames: Array, values: Array, knot: NDArray[np.bool_], margin: Ar
     Returns
     -------
     (K, C) float array
-        The largest distance that is left.
+        The largest remaining distance.
     """
     count, points, channels = values.shape
-    # One point after the other, so that what lies between two knots lies together.
+    # One point after the other, so that samples between two knots are contiguous.
     rows, when = values.transpose(1, 0, 2).reshape(-1, channels), np.tile(frames, points)
     error = np.zeros((points, channels))
     at = np.flatnonzero(knot.T)
@@ -87,6 +87,6 @@ def bend_lines(frames: Array, values: Array, knot: NDArray[np.bool_], margin: Ar
 
 
 def _with_samples_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
-    """Those of some lines between rows of points, `count` each, that have rows between their ends."""
-    kept = (end - begin > 1) & (begin // count == end // count)
-    return begin[kept], end[kept]
+    """Lines between rows of points, `count` each, that have rows between their ends."""
+    longer = (end - begin > 1) & (begin // count == end // count)
+    return begin[longer], end[longer]

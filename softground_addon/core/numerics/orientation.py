@@ -65,21 +65,18 @@ def euler_rotations(angles: Array, order: str) -> Array:
     return result
 
 
-def quaternion_product(left: Array, right: Array) -> Array:
-    """Products (F, 4) of quaternions (F, 4), w first: the right one turns first."""
-    w, x, y, z = left.T
-    columns = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-    return np.asarray(np.einsum("ijf,fj->fi", columns, right))
+def without_leaps(quaternion: Array) -> Array:
+    """The same turns (F, 4) with signs that change nowhere from one sample to the next."""
+    same = (quaternion[1:] * quaternion[:-1]).sum(axis=1) >= 0
+    return quaternion * np.cumprod(np.append(1.0, np.where(same, 1.0, -1.0)))[:, None]
 
 
-def quaternion_power(quaternion: Array, power: float) -> Array:
-    """Unit quaternions (F, 4), w first, that turn by `power` times as much about the same axes."""
-    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    unit = np.where(unit[:, :1] < 0, -unit, unit)
-    sine = np.linalg.norm(unit[:, 1:], axis=1, keepdims=True)
-    half = np.arctan2(sine, unit[:, :1])
-    axis = np.divide(unit[:, 1:], sine, out=np.zeros_like(unit[:, 1:]), where=sine > 1e-12)
-    return np.concatenate([np.cos(power * half), np.sin(power * half) * axis], axis=1)
+def axis_angles(quaternion: Array) -> Array:
+    """Angles [rad] and axes (F, 4) of unit quaternions (F, 4), w first; y is the axis of no turn."""
+    sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(sine, quaternion[:, :1])
+    axis = np.divide(quaternion[:, 1:], sine, out=np.tile((0.0, 1.0, 0.0), (len(sine), 1)), where=sine > 1e-9)
+    return np.concatenate([angle, axis], axis=1)
 
 
 def euler_angles(matrices: Array, order: str, near: Array) -> Array:
@@ -105,10 +102,10 @@ def euler_angles(matrices: Array, order: str, near: Array) -> Array:
     turned = np.arctan2(-sign * m[:, i, j], m[:, j, j])
     first = np.where(locked, held, first)
     last = np.where(locked, turned + np.where(m[:, k, i] < 0, held, -held), last)
-    one, other = np.empty((len(m), 3)), np.empty((len(m), 3))
-    one[:, i], one[:, j], one[:, k] = first, middle, last
-    other[:, i], other[:, j], other[:, k] = first + np.pi, np.pi - middle, last + np.pi
-    candidates = np.stack([one, other])
+    direct, flipped = np.empty((len(m), 3)), np.empty((len(m), 3))
+    direct[:, i], direct[:, j], direct[:, k] = first, middle, last
+    flipped[:, i], flipped[:, j], flipped[:, k] = first + np.pi, np.pi - middle, last + np.pi
+    candidates = np.stack([direct, flipped])
     candidates -= 2 * np.pi * np.rint((candidates - near) / (2 * np.pi))
     nearer = np.abs(candidates - near).sum(axis=2).argmin(axis=0)
     return np.asarray(candidates[nearer, np.arange(len(m))])

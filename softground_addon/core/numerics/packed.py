@@ -8,10 +8,12 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from .slices import Slices, sliced
+
 Number = TypeVar("Number", bound=np.generic)
 
 LEVEL = 1
-"""Of zlib: the higher ones take longer than looking at a footprint does, and gain little."""
+"""Level of zlib: higher ones take longer than a look at a footprint, and gain little."""
 
 
 class PackedArray(Generic[Number]):
@@ -26,8 +28,8 @@ class PackedArray(Generic[Number]):
     --------
     >>> steps = PackedArray(np.array([1, 2]))
     >>> steps.extend(PackedArray(np.array([3])))
-    >>> steps.unpacked().tolist()
-    [1, 2, 3]
+    >>> steps.unpacked().tolist(), len(list(steps.unpacking()))  # in as many slices as it has grown by
+    ([1, 2, 3], 2)
     """
 
     __slots__ = ("_kind", "_parts", "_row", "_size")
@@ -48,12 +50,17 @@ class PackedArray(Generic[Number]):
 
     def unpacked(self) -> NDArray[Number]:
         """The array as a new one."""
-        whole = np.empty((self._size, *self._row), self._kind)
+        return sliced(self.unpacking)()
+
+    def unpacking(self) -> Slices[NDArray[Number]]:
+        """What `unpacked` does, in slices."""
+        whole: NDArray[Number] = np.empty((self._size, *self._row), self._kind)
         content, first = _bytes_of(whole), 0
         for part in map(zlib.decompress, self._parts):
             values = np.frombuffer(part, np.uint8).reshape(self._kind.itemsize, -1).T
             content[first : first + len(values)] = values
             first += len(values)
+            yield
         return whole
 
 

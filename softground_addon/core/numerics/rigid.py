@@ -22,7 +22,7 @@ def rotation(vector: Array) -> Array:
 
 
 def cross_matrix(vector: Array) -> Array:
-    """Matrices (..., 3, 3) that take the cross product of `vector` (..., 3) with what they are applied to."""
+    """Matrices (..., 3, 3) of the cross product with `vector` (..., 3) from the left."""
     x, y, z = np.moveaxis(vector, -1, 0)
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)

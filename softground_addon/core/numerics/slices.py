@@ -9,12 +9,14 @@ from collections.abc import Callable, Generator
 from functools import wraps
 from typing import ParamSpec, Protocol, TypeVar, cast
 
+import numpy as np
+
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 Result_co = TypeVar("Result_co", covariant=True)
 
 Slices = Generator[None, None, Result]
-"""What is left of a computation; it says nothing between two slices, and returns the result."""
+"""The rest of a computation: yields nothing between two slices and returns the result."""
 
 
 class Sliced(Protocol[Parameters, Result_co]):
@@ -55,3 +57,14 @@ def sliced(slices: Callable[Parameters, Slices[Result]]) -> Sliced[Parameters, R
     function = cast("Sliced[Parameters, Result]", whole)
     function.slices = slices  # type: ignore[method-assign]
     return function
+
+
+def without_warnings(work: Slices[Result]) -> Slices[Result]:
+    """The same slices, in which NumPy does not warn of numbers that are none; between them it does."""
+    while True:
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            try:
+                next(work)
+            except StopIteration as end:
+                return cast("Result", end.value)
+        yield

@@ -1,7 +1,7 @@
 """Acceleration of a sampled path by a smoothing spline that knows free fall.
 
 A discrete smoothing spline is a zero-phase low-pass (its gain is 1/(1 + (f/cut-off)^6)) that needs no data beyond the
-ends of the path, takes samples at any subset of the steps, and can be told what is known about the acceleration.
+ends of the path, takes samples at any subset of the steps, and known accelerations at others.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 _ORDER = 3
 """The penalty is on the third derivative, so the bandwidth of the normal equations is 3."""
 _FALL_WEIGHT = 1e5
-"""How much more a known fall counts than the samples near the cut-off frequency."""
+"""Weight of a known fall over that of the samples near the cut-off frequency."""
 
 
 def smooth_path(
@@ -46,7 +46,7 @@ def smooth_path(
     fall : float
         [unit of path/s²]
     steady_ends : float
-        How much a second derivative of 0 is expected at both ends, where the samples lie on one side only.
+        Weight of a second derivative of 0 at both ends, where the samples lie on one side only.
 
     Returns
     -------

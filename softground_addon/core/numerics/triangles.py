@@ -15,7 +15,7 @@ SLACK = 1e-9
 
 
 class Barycentric(NamedTuple):
-    """Where N points lie in N triangles: at a + u·(b - a) + v·(c - a), and whether that is inside."""
+    """Coordinates of N points in N triangles, at a + u·(b - a) + v·(c - a); `inside` is true where they are inside."""
 
     u: Array
     v: Array
@@ -46,6 +46,6 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def enumerated(counts: Indices) -> tuple[Indices, Indices]:
-    """For counts (2, 3): owner (0, 0, 1, 1, 1) and number within the owner (0, 1, 0, 1, 2)."""
+    """Owners and numbers within them: for counts (2, 3), (0, 0, 1, 1, 1) and (0, 1, 0, 1, 2)."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -1,1 +1,1 @@
-"""How the record plays: height over time at each vertex, as tables and curves."""
+"""Playback of the record: height over time at each vertex, as tables and curves."""

@@ -7,18 +7,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Window
+from ..ground.sparse_grid import Window
 from ..numerics.packed import PackedArray
 from ..record.footprints import QUANTUM, Footprint
 
 Array = NDArray[np.float64]
 
 BLOCK = 64
-"""Cells along the sides of what is worked on at once: most footprints fit into one block."""
+"""Cells along the sides of a block: most footprints fit into one."""
 
 
 class ChangesInBlocks:
-    """Changes of a footprint's compression and rim, sorted into blocks of its window when they are first asked for.
+    """Changes of a footprint's compression and rim, sorted into blocks of its window at the first use.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class ChangesInBlocks:
 
     @cached_property
     def _blocks(self) -> list[list[PackedArray[np.int32]]]:
-        """By row and column of blocks: of each change of a cell its number among all frames, the cell, the amount."""
+        """Changes by row and column of blocks: number of the frame, cell and amount of each."""
         window, both = self.footprint.window, (self.footprint.compression, self.footprint.rim)
         cell = np.concatenate([changes.cells for changes in both])
         row, column = np.divmod(cell, window.columns)
@@ -47,13 +47,13 @@ class ChangesInBlocks:
 
     def within(self, window: Window) -> tuple[Array, Array]:
         """Changes of compression and rim within a window, (T, 2, rows, columns) [m], at frames (T,) without gaps."""
-        own, step = self.footprint.window, self.footprint.frame_step
-        first_row, first_column = window.row - own.row, window.column - own.column
+        whole, step = self.footprint.window, self.footprint.frame_step
+        first_row, first_column = window.row - whole.row, window.column - whole.column
         near = [np.zeros((3, 0), dtype=np.int32)]
         for blocks in self._blocks[_reached(first_row, window.rows)]:
             near += [block.unpacked() for block in blocks[_reached(first_column, window.columns)]]
         number, cell, amount = np.concatenate(near, axis=1)
-        row, column = np.divmod(cell, own.columns)
+        row, column = np.divmod(cell, whole.columns)
         row, column = row - first_row, column - first_column
         within = (row >= 0) & (row < window.rows) & (column >= 0) & (column < window.columns)
         number = number[within]
@@ -76,5 +76,5 @@ def _blocks_along(cells: int) -> int:
 
 
 def _reached(first: int, cells: int) -> slice:
-    """Numbers of the blocks along a side that some cells lie in, of which the first are before the side begins."""
+    """Numbers of the blocks along a side that hold cells; the first cell may be negative."""
     return slice(max(first, 0) // BLOCK, max(_blocks_along(first + cells), 0))

@@ -1,7 +1,7 @@
 """All that happens to each place of the ground in one table: its rows are in the order of time.
 
-Ramps and contacts of a place overlap, and how many there are depends on how often it is stepped on. Put together they
-are a curve per place: what it is like at a time lies between two rows.
+Ramps and contacts of a place overlap, and their number depends on how often it is stepped on. Put together they
+are a curve per place: its state at a time lies between two rows.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class KeyframeTables:
 
 
 def keyframe_tables(over_time: VertexHistories) -> KeyframeTables:
-    """The vertex_histories as one table.
+    """The vertex histories as one table.
 
     Values are rounded to `ramps.QUANTUM`, which those at rest are multiples of.
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import SparseGrid
+from ..ground.sparse_grid import SparseGrid
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
@@ -37,13 +37,13 @@ NARROW = 2.0**-30
 """Scale of heights across a curve, so small that the length along it is the time to the last bit."""
 
 LENGTH = 512.0
-"""Up to here places begin on a curve [frames]: in single precision its length is known to a `TICK`."""
+"""Length of a curve at which its last place begins [frames]: single precision resolves it to a `TICK`."""
 
 TICK = 2.0**-14
-"""Of the time along a curve [frames]."""
+"""Resolution of the time along a curve [frames]."""
 
 CONTACTS_AT_ONCE = 5_000
-"""Footprints' cells over places whose vertex_histories are worked out together: some ten megabytes."""
+"""Footprints' cells over places whose histories are computed together: some ten megabytes."""
 
 PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
@@ -71,7 +71,7 @@ class PlaybackCurves:
 
 @dataclass(frozen=True)
 class Spans:
-    """When something happens to each of P places, and where it lies on the curves.
+    """Time spans of the changes at P places, and their position on the curves.
 
     Attributes
     ----------
@@ -81,9 +81,9 @@ class Spans:
         First and last frame of each place: before, nothing has happened to it; after, all but the time since the
         contact stays as it is at the last, where nothing presses any more.
     curve : (P,) int32 array
-        Which of the curves it lies on.
+        Curve that it lies on.
     offset : (P,) float32 array
-        Where on that it starts [frames].
+        Its start on that curve [frames].
     last_height : (P,) float32 array
         Change of the displayed height at the last frame [m].
     last_contact : (P,) float32 array
@@ -189,15 +189,15 @@ def _relief_of_parts(
     for number in range(len(parts)):
         reliefs = [NOTHING] * len(relief)
         for step_number, step in reached[number]:
-            there = part_of[step.point] == number
+            in_part = part_of[step.point] == number
             reliefs[step_number] = replace(
-                step, point=within[step.point[there]], change=step.change[there], water=step.water[there]
+                step, point=within[step.point[in_part]], change=step.change[in_part], water=step.water[in_part]
             )
         yield reliefs
 
 
 def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, PlaybackCurves]:
-    """The vertex_histories as curves; their frames per second tell how long a contact has been over.
+    """The vertex histories as curves; frames per second give the time since a contact.
 
     Examples
     --------
@@ -245,7 +245,7 @@ def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, Playba
 
 
 def _end_to_end(length: Array) -> tuple[Indices, Array]:
-    """Which curve each place of some length is on if they are laid end to end, and where on it that begins [frames].
+    """Curve of each place if their lengths are laid end to end, and the start of each on it [frames].
 
     The gap behind each is at least a frame. PlaybackCurves begin no place beyond `LENGTH`.
     """
@@ -259,16 +259,16 @@ def _with_turns(table: KeyframeTables, place: Indices) -> tuple[Indices, Array]:
     contact = np.flatnonzero((table.frame == table.contact_start) & (table.contact_end > table.contact_start))
     length = table.contact_end[contact] - table.contact_start[contact]
     turns = [table.contact_start[contact] + part * length for part in (LOADING, 1.0 - LOADING)]
-    own = np.arange(len(place))
+    rows = np.arange(len(place))
     when = np.concatenate([table.frame, *turns])
-    source = np.concatenate([own, contact, contact])
-    order = np.lexsort((np.arange(len(when)) >= len(own), when, place[source]))
-    row = np.maximum.accumulate(np.where(order < len(own), order, -1))
+    source = np.concatenate([rows, contact, contact])
+    order = np.lexsort((np.arange(len(when)) >= len(rows), when, place[source]))
+    row = np.maximum.accumulate(np.where(order < len(rows), order, -1))
     # A turn counts while its contact is the latest, and where there is no row already.
-    kept = (order < len(own)) | (
+    current = (order < len(rows)) | (
         (table.contact_start[row] == table.contact_start[source[order]]) & (table.frame[row] < when[order])
     )
-    return row[kept], when[order][kept]
+    return row[current], when[order][current]
 
 
 def _movement(table: KeyframeTables, row: Indices, frame: Array) -> Array:

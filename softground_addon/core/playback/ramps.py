@@ -1,4 +1,4 @@
-"""How the ground moves over time, in closed form: a few ramps per point.
+"""Movement of the ground over time, in closed form: a few ramps per point.
 
 A ramp changes a value by `change` between two frames, linearly, and holds it before and after. A point's value at any
 time is the sum of its ramps, so that frames can be shown in any order, and between frames, without a cache.
@@ -41,7 +41,7 @@ class Ramps:
     start, end : (R,) float arrays
         Frames between which the values change; start < end.
     change : (R, C) float array
-        By how much, each of the C values that a point has.
+        Change of each of a point's C values.
     """
 
     point: Indices
@@ -51,7 +51,7 @@ class Ramps:
 
     @classmethod
     def joined(cls, parts: Sequence[Ramps], channels: int) -> Ramps:
-        """All ramps of several sets, which may share points; how many values these have must be told for none."""
+        """All ramps of several sets, which may share points; the number of values is needed if there is no set."""
         return joined([cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels))), *parts])
 
     def at(self, frame: float, points: int) -> Array:
@@ -64,7 +64,7 @@ class Ramps:
 
 
 def joined(parts: Sequence[Intervals]) -> Intervals:
-    """What points have between a `start` and an `end`, of several sets of at least one, by point and time."""
+    """One set of intervals of points from at least one set, by point and time."""
     whole = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(parts[0])}
     order = np.lexsort((whole["start"], whole["point"]))
     return type(parts[0])(**{name: values[order] for name, values in whole.items()})
@@ -72,7 +72,7 @@ def joined(parts: Sequence[Intervals]) -> Intervals:
 
 @dataclass(frozen=True)
 class Fit:
-    """Ramps and how far they are from what they stand for.
+    """Ramps and their distance from the values that they stand for.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float
 
 
 def _ends_of_movements(values: Array) -> NDArray[np.bool_]:
-    """Where movements of points begin and end, (T, K), from their values (T, K, C)."""
+    """True where movements of points begin or end, (T, K), from their values (T, K, C)."""
     moves = (np.diff(values, axis=0) != 0).any(axis=-1)
     step, never = np.arange(len(moves))[:, None], len(moves) + REST
     before = np.maximum.accumulate(np.where(moves, step, -never), axis=0)

@@ -1,4 +1,4 @@
-"""What each place of the ground goes through during a bake: the record of footprints as ramps and contacts.
+"""History of each place of the ground during a bake: the record of footprints as ramps and contacts.
 
 Footprints add up and the display blur is linear, so that each footprint is looked at alone, where and while it moves
 the ground. Time and memory follow the number of footprints, not the length of the shot or the size of the ground.
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
-from ..ground.heightfield import Window
 from ..ground.places import Places, inside
+from ..ground.sparse_grid import Window
 from ..numerics import bilinear
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
@@ -31,7 +31,7 @@ SHADING_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class PointContacts:
-    """When soles touched places, and how hard.
+    """Contacts of soles with places, and their pressure.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def vertex_histories(
     relief : sequence of StepRelief
         Of each footprint at these places, if there is relief: it grows with the movement that its step makes.
     in_blocks : dict, optional
-        What one call keeps of the footprints near its places, by their numbers, for the next one at places beside them.
+        Cache of the footprints near the places, by their numbers, for the next call at places beside them.
     """
     in_blocks = {} if in_blocks is None else in_blocks
     places = Places(x, y)
@@ -121,21 +121,20 @@ def vertex_histories(
     contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
     for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
-        own: list[Ramps] = []
+        of_step: list[Ramps] = []
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
         for points, frames, moved in _movements(in_blocks[near[number]], places, kernels[footprint.cell_size]):
             shared = np.zeros(len(points))
             for other in together:
                 shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
             fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
-            own.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
+            of_step.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
             yield
         if len(its_relief.point):
-            own = [
-                grown(Ramps.joined(own, 2), its_relief.point, its_relief.change, (spans[number, 0], spans[number, 1]))
-            ]
-        movements += own
+            span = spans[number, 0], spans[number, 1]
+            of_step = [grown(Ramps.joined(of_step, 2), its_relief.point, its_relief.change, span)]
+        movements += of_step
         contacts.append(_point_contacts(footprint, places))
         yield
     return VertexHistories(
@@ -160,7 +159,7 @@ def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[floa
 
 
 def _margin(kernel: Array) -> int:
-    """How many cells around a change the display moves: the blur's, and one for the look-up between cell centres."""
+    """Cells around a change that the display moves: the blur's, and one for the look-up between cell centres."""
     return len(kernel) // 2 + 1
 
 
@@ -215,10 +214,10 @@ def _look_up(values: Array, window: Window, cell_size: float, places: Places, po
     """Values (T, channels, rows, columns) of a window at places, bilinear between cell centres: (T, channels, N)."""
     column = places.x[points] / cell_size - 0.5 - window.column
     row = places.y[points] / cell_size - 0.5 - window.row
-    left, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
-    u, v = column - left, row - low
+    first, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
+    u, v = column - first, row - low
     flat = values.reshape(*values.shape[:2], -1)
-    corner = low * window.columns + left
+    corner = low * window.columns + first
     above = corner + window.columns
     return bilinear.between((flat[..., at] for at in (corner, corner + 1, above, above + 1)), u, v)
 

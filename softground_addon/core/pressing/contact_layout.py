@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Window
-from ..motion.motion import Sole
+from ..ground.sparse_grid import Window
+from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .ground_cells import GroundCells, Imprints, Timing
 from .rim import lean_of_landing, leaning
@@ -83,10 +83,10 @@ class ContactLayout(ABC):
         return self._window(self.first, self.end, cells)
 
     def _deeper(self, imprints: Imprints, cells: GroundCells) -> Imprints:
-        """The imprints with `strength` times their compression, as far as the layer is deep."""
+        """The imprints with `strength` times their compression, as far as the ground gives way."""
         if self.strength == 1.0:
             return imprints
-        deepest = cells.material.layer_depth * (imprints.factors.depth if imprints.factors else 1.0)
+        deepest = cells.material.deepest * (imprints.factors.depth if imprints.factors else 1.0)
         return replace(imprints, target=np.minimum(imprints.target * self.strength, deepest))
 
     def heading(self, step: int) -> float:

@@ -1,4 +1,4 @@
-"""Compression of the ground, step by step (MODEL.md section 4; the paper, Eq. 10-11 as corrected); its rim is in `rim`.
+"""Compression of the ground, step by step (docs/model.md section 4; the paper, Eq. 10-11 corrected). `rim` has its rim.
 
 Functions over arrays: whatever is said of a cell may be a number or an array over cells, so that a material that
 varies over the ground only changes what is passed in.
@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.material import FIRM_RATIO, GroundMaterial
+from ..ground.ground_law import loose_strain, packed, strain
+from ..ground.material import GroundMaterial
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -42,17 +43,22 @@ class Sinking:
 
 
 def target_compression(
-    stress: Array | float, material: GroundMaterial, *, stiffness: Array | float = 1.0, depth: Array | float = 1.0
+    stress: Array | float,
+    material: GroundMaterial,
+    *,
+    firmness: Array | float = 1.0,
+    stiffness: Array | float = 1.0,
+    depth: Array | float = 1.0,
 ) -> Array:
-    """Compression that a lasting stress leads to [m]: stress·L0/E, at most the layer's depth (Eq. 10).
-
-    Beyond the firm depth it grows `FIRM_RATIO` times more slowly.
+    """Compression that a lasting stress leads to [m]: the strain of the layer (Eq. 10; `ground_law`) times its depth.
 
     Parameters
     ----------
     stress : float array of any shape
         Normal stress [Pa]; over cells where the pressure varies under the sole.
     material : GroundMaterial
+    firmness : float
+        See `GroundMaterial.firmness`.
     stiffness, depth : float or float array
         Factors on the modulus and on the depth of the layer, and of what is firm below, where the ground varies.
 
@@ -62,16 +68,8 @@ def target_compression(
     >>> round(float(target_compression(21.9e3, snow)), 5)
     0.02628
     """
-    strain = np.asarray(stress) / (material.youngs_modulus * stiffness)
-    return np.asarray(np.minimum(_over_firm(strain, material), 1.0) * (material.layer_depth * depth))
-
-
-def _over_firm(strain: Any, material: GroundMaterial) -> Any:
-    """The strain of the whole layer, from what it would be if the layer were loose all through."""
-    if not material.firm_depth:
-        return strain
-    loose = material.firm_depth / material.layer_depth
-    return np.minimum(strain, loose) + np.maximum(strain - loose, 0.0) / FIRM_RATIO
+    load = np.asarray(stress) / (material.youngs_modulus * firmness * stiffness)
+    return np.asarray(strain(load, material) * (material.layer_depth * depth))
 
 
 def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, landing_speed: Any = 0.0) -> Any:
@@ -125,6 +123,7 @@ def sink(
     material: GroundMaterial,
     sinkage: float = 0.0,
     landing_speed: float = 0.0,
+    firmness: float = 1.0,
     softness: Array | None = None,
 ) -> Sinking:
     """Follow a loaded sole into the ground.
@@ -149,6 +148,8 @@ def sink(
         That reached before the first step [m].
     landing_speed : float
         See `compression_rate` [m/s].
+    firmness : float
+        See `GroundMaterial.firmness`.
     softness : (N, Q) float array, optional
         Compression of the ground under each point per that of the material, where the ground varies.
 
@@ -159,7 +160,9 @@ def sink(
     steps = len(force)
     touching_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
     rate = compression_rate(step, material)
-    per_pascal = material.layer_depth / material.youngs_modulus
+    layer, modulus = material.layer_depth, material.youngs_modulus * firmness
+    # Rounded as it always was where the ground is the paper's, so that old shots bake to the same bytes.
+    per_pascal = layer / modulus if material.exponent == 1.0 and not material.firm_depth else 0.0
     follows_landing = bool(material.shortest_time and landing_speed)
     reached[0] = sinkage
     for k in range(steps):
@@ -167,12 +170,10 @@ def sink(
         touching_area[k] = touching @ area[k]
         if force[k] > 0 and touching_area[k] > 0:
             stress = force[k] / touching_area[k]
-            fresh = stress * per_pascal
-            if material.firm_depth:
-                fresh = float(_over_firm(stress / material.youngs_modulus, material)) * material.layer_depth
+            fresh = stress * per_pascal or float(loose_strain(stress / modulus, material)) * layer
             if softness is not None:
                 fresh *= float(touching @ (area[k] * softness[k])) / touching_area[k]
-            target[k] = min(fresh, material.layer_depth)
+            target[k] = packed(fresh, material, layer)
             if follows_landing:
                 rate = compression_rate(step, material, target[k], landing_speed)
             if sinkage > 0 or stress >= material.crust_stress:

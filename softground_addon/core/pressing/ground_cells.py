@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Surface, Terrain, TerrainTiles, Window
-from ..ground.material import GroundMaterial
+from ..ground.heightfield import Surface, Terrain, TerrainTiles
 from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, Variation, VariationTiles
 
 Array = NDArray[np.float64]
@@ -78,16 +78,14 @@ class GroundCells:
         Side of a cell [m].
     surface, factors
         See `UndisturbedCells`.
+    material : GroundMaterial
+        What the ground is made of, under its gravity.
     """
 
     def __init__(self, ground: SoftGround, undisturbed: UndisturbedCells) -> None:
         self.ground, self.cell_size = ground, undisturbed.cell_size
         self.surface, self.factors = undisturbed.surface, undisturbed.factors
-
-    @property
-    def material(self) -> GroundMaterial:
-        """What the ground is made of."""
-        return self.ground.material
+        self.material = ground.material.under(ground.gravity)
 
     @property
     def rim_reach(self) -> float:

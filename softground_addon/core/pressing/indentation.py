@@ -1,13 +1,13 @@
 """How deep a load presses a rigid body into the ground, and the shape of the hollow: bowls, ruts, grooves.
 
-A flat sole presses evenly: stress = force/area, and the ground gives way by stress·L0/E (Eq. 10). The same ground under
-a body of any shape is a bed of springs, each of which carries E/L0 per metre that the body presses it down (Winkler's
-foundation; for wheels, Bekker's with exponent 1). The body sinks until they carry its load, so that
+A flat sole presses evenly, and the ground gives way as `ground_law` says of stress = force/area. The same ground under
+a body of any shape is a bed of springs, each of which carries what the law says of how far the body presses it down
+(Winkler's foundation; for wheels, Bekker's). The body sinks until they carry its load, so that
 
-    E/L0 · ∫ compression dA = force,   compression = max(0, sinkage - clearance),
+    ∫ stress(compression) dA = force,   compression = max(0, sinkage - clearance),
 
-and the mean compression over the contact is what Eq. 10 says. A sphere of radius R that sinks by d touches within
-sqrt(2Rd - d²) and leaves a cap of volume pi·d²(3R - d)/3.
+and under the paper's linear law, E/L0 per metre, the mean compression over the contact is what Eq. 10 says. A sphere of
+radius R that sinks by d touches within sqrt(2Rd - d²) and leaves a cap of volume pi·d²(3R - d)/3.
 """
 
 from __future__ import annotations
@@ -17,9 +17,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.ground_law import load_at
 from ..ground.material import FIRM_RATIO, GroundMaterial
 
 Array = NDArray[np.float64]
+
+CLOSE = 1e-9
+"""Relative error of the load that a body is borne with on ground whose springs are not linear."""
+MOST_ROUNDS = 60
+"""Trials of a sinkage; five or six suffice."""
+TINY = 1e-300
+"""Depth that stands for a layer of none [m]."""
+SHALLOW = 0.01
+"""Sinkage that is tried first where none is known, in parts of the deepest."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +51,17 @@ class Springs:
     stiffness: Array | float = 1.0
     depth: Array | float = 1.0
 
-    def sinkage(self, force: float, material: GroundMaterial) -> float:
-        """How far the lowest sample sinks under a lasting force [N], at most by the layer's depth [m].
+    def sinkage(self, force: float, material: GroundMaterial, firmness: float = 1.0, near: float = 0.0) -> float:
+        """How far the lowest sample sinks under a lasting force [N], at most by what the layer gives way [m].
+
+        Parameters
+        ----------
+        force : float
+        material : GroundMaterial
+        firmness : float
+            See `GroundMaterial.firmness`.
+        near : float
+            A sinkage that is likely, as under the pose before [m].
 
         Examples
         --------
@@ -52,6 +71,12 @@ class Springs:
         >>> round(plate.sinkage(1000.0, GroundMaterial(1e6, 0.2, 0.1, layer_depth=0.3)), 6)
         0.003
         """
+        deepest = material.deepest * float(np.max(self.depth))
+        if material.linear:
+            return min(self._linear_sinkage(force / firmness, material), deepest)
+        return self._searched_sinkage(force, material, firmness, near, deepest)
+
+    def _linear_sinkage(self, force: float, material: GroundMaterial) -> float:
         layer = material.layer_depth * np.asarray(self.depth)
         bears = np.broadcast_to(layer > 0, self.clearance.shape)
         rate = np.divide(
@@ -62,23 +87,52 @@ class Springs:
             firm = material.firm_depth * np.broadcast_to(self.depth, start.shape)
             start = np.concatenate([start, start + firm])
             gain = np.concatenate([gain, (FIRM_RATIO - 1.0) * rate])
-        return min(_reach(start, gain, force), material.layer_depth * float(np.max(self.depth)))
+        return _reach(start, gain, force)
+
+    def _searched_sinkage(
+        self, force: float, material: GroundMaterial, firmness: float, near: float, deepest: float
+    ) -> float:
+        """By regula falsi in logarithms, in which a power law is a straight line."""
+        weight = self.area * self.stiffness * (material.youngs_modulus * firmness) * (np.asarray(self.depth) > 0)
+        layer = np.maximum(material.layer_depth * np.asarray(self.depth), TINY)
+
+        def carried(sinkage: float) -> float:
+            return float(weight @ load_at(np.maximum(sinkage - self.clearance, 0.0) / layer, material))
+
+        if carried(deepest) <= force:
+            return deepest
+        low, high = 0.0, deepest
+        trial, slope, before = min(near or SHALLOW * deepest, deepest / 2), material.exponent, None
+        for _ in range(MOST_ROUNDS):
+            bears = carried(trial)
+            if abs(bears - force) <= CLOSE * force:
+                break
+            low, high = (trial, high) if bears < force else (low, trial)
+            if before is not None and bears > 0:
+                slope = np.log(bears / before[1]) / np.log(trial / before[0])
+            if bears > 0:
+                before = trial, bears
+            trial = trial * float((force / bears) ** (1.0 / slope)) if bears > 0 and slope > 0 else high
+            if not low < trial < high:
+                trial = (low + high) / 2
+        return trial
 
     def compression(self, sinkage: float, material: GroundMaterial) -> Array:
         """Compression under each sample at a sinkage, (Q,) [m]."""
-        return np.clip(sinkage - self.clearance, 0.0, material.layer_depth * np.asarray(self.depth))
+        return np.clip(sinkage - self.clearance, 0.0, material.deepest * np.asarray(self.depth))
 
 
 def stress(
-    compression: Array, material: GroundMaterial, *, stiffness: Array | float = 1.0, depth: Array | float = 1.0
+    compression: Array,
+    material: GroundMaterial,
+    *,
+    firmness: Array | float = 1.0,
+    stiffness: Array | float = 1.0,
+    depth: Array | float = 1.0,
 ) -> Array:
     """What the ground carries where it is compressed so far [Pa]: the inverse of `deformation.target_compression`."""
-    loaded = compression
-    if material.firm_depth:
-        beyond = np.maximum(compression - material.firm_depth * np.asarray(depth), 0.0)
-        loaded = compression + (FIRM_RATIO - 1.0) * beyond
-    layer = np.maximum(material.layer_depth * np.asarray(depth), 1e-300)
-    return np.asarray(material.youngs_modulus * stiffness * loaded / layer)
+    layer = np.maximum(material.layer_depth * np.asarray(depth), TINY)
+    return np.asarray(material.youngs_modulus * firmness * stiffness * load_at(compression / layer, material))
 
 
 def _reach(start: Array, gain: Array, load: float) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ground.heightfield import SparseGrid, Surface
+from ..ground.heightfield import Surface
+from ..ground.sparse_grid import SparseGrid
 from ..record.contact_steps import ContactSteps
 from ..record.footprints import Footprint, FootprintRecorder
 from .contact_layout import ContactLayout

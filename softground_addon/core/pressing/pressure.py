@@ -137,6 +137,22 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     return PressureField(middle, field[:, 0] / kept, field[:, 1:] / kept[:, None], highest / kept)
 
 
+def spread_out(relative: Single, widening: Array) -> None:
+    """Even out, in place, a pressure relative to its mean (N, rows, columns), as a load does on its way down.
+
+    Its mean stays, so that the force does; its centre comes to lie nearer to the middle.
+
+    Parameters
+    ----------
+    relative : (N, rows, columns) float array
+    widening : (N,) float array
+        How far the load has widened to each side, in lengths of the sole.
+    """
+    relative -= 1.0
+    relative *= (1.0 / (1.0 + 2.0 * widening)).astype(np.float32)[:, None, None]
+    relative += 1.0
+
+
 def _force(field: Array, x: Single, y: Single, highest: Array, share: Single) -> Array:
     """Part of the force that a pressure bears, (N,)."""
     return np.asarray(np.einsum("nq,nq->n", _pressure(field, x, y, highest), share, dtype=float))

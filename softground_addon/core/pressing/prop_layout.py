@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Surface, Window
+from ..ground.heightfield import Surface
 from ..ground.material import GroundMaterial
+from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, layer_factors
-from ..motion.motion import Sole
 from ..motion.props import Prop
+from ..motion.sole_motion import Sole
 from ..numerics.interpolation import turning
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
@@ -30,6 +32,10 @@ MOST_PARTS = 32
 """Parts of a step at most."""
 FIRST_EXTENT = 0.05
 """Part of a body that is looked at before it is known how deep it sinks, in its sizes above its lowest point."""
+DIRECTIONS = 16
+"""Directions in which a body is measured for how narrow it is."""
+NARROWEST = 1e-3
+"""Least width of a body, in its sizes."""
 STANDSTILL = 1e-4
 """A body that moves less than this in a step, in its sizes, has no direction of travel."""
 
@@ -101,7 +107,8 @@ class PropLayout(ContactLayout):
         rate = np.broadcast_to(compression_rate(step / parts, material, depth, self._landing_drop / step), depth.shape)
         holds = None
         if material.crust_stress:
-            holds = stress(target, material, **layer_factors(factors)) < material.crust_stress
+            firmness = material.firmness(self._width)
+            holds = stress(target, material, firmness=firmness, **layer_factors(factors)) < material.crust_stress
         return Imprints(
             start,
             parts,
@@ -131,6 +138,13 @@ class PropLayout(ContactLayout):
     def _length(self) -> float:
         return self.prop.size
 
+    @cached_property
+    def _width(self) -> float:
+        """Narrowest extent of the body across the ground as it comes down [m]."""
+        angle = np.arange(DIRECTIONS) * np.pi / DIRECTIONS
+        across = np.stack([np.cos(angle), np.sin(angle)], axis=-1) @ self.steps.poses[0, 0, :2, :3]
+        return max(float(np.ptp(across @ self.prop.probes.T, axis=1).min()), NARROWEST * self.prop.size)
+
     def _middles(self, poses: Array) -> Array:
         middle: Array = poses[:, 0, :3, 3]
         return middle
@@ -154,13 +168,14 @@ class PropLayout(ContactLayout):
         """What the body presses at a pose, under a lasting force, after one under which it sank so far [m]."""
         shape = (cells.window.rows, cells.window.columns)
         indentation = _Indentation(np.zeros(shape), np.zeros(shape), 0.0, 0.0)
-        deepest = material.layer_depth * (float(factors.depth.max()) if factors else 1.0)
+        deepest = material.deepest * (float(factors.depth.max()) if factors else 1.0)
+        firmness = material.firmness(self._width)
         extent = min(max(2 * reached, FIRST_EXTENT * self.prop.size), deepest)
         while True:
             under = ground_under(self.prop, pose, cells, extent, factors) if force > 0 else None
             if under is None:
                 return indentation
-            sinkage = under.springs.sinkage(force, material)
+            sinkage = under.springs.sinkage(force, material, firmness, reached)
             if sinkage <= extent or extent >= deepest:
                 break
             extent = min(2 * sinkage, deepest)

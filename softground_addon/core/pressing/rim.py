@@ -1,4 +1,4 @@
-"""The rim around a contact: how much of the ground rises, and where (MODEL.md section 4; the paper, Eq. 12-14)."""
+"""The rim around a contact: how much of the ground rises, and where (docs/model.md section 4; the paper, Eq. 12-14)."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
-from ..motion.motion import Sole, SolePatch
+from ..motion.sole_motion import Sole, SolePatch
 from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
 from .deformation import touching_fraction
 from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps

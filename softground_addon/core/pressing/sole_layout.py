@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Window
+from ..ground.sparse_grid import Window
 from ..ground.variation import layer_factors
-from ..motion.motion import Sole
+from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import Sinking, compression_rate, sink, target_compression, touching_fraction
 from .ground_cells import GroundCells, Imprints, Loads
-from .pressure import pressure_field
+from .pressure import pressure_field, spread_out
 from .rim import in_contact, rim_weights, whole_reach
 from .sole_imprint import cell_coverage
 from .sole_points import PointContact, SolePoints, centroid, contact_window, places, point_contact
@@ -35,6 +35,7 @@ class SoleLayout(ContactLayout):
 
     def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints, *, strength: float = 1.0) -> None:
         self.points = points
+        self._width = points.width
         super().__init__(character, sole, steps, strength=strength)
 
     def _window(self, start: int, end: int, cells: GroundCells) -> Window:
@@ -53,7 +54,11 @@ class SoleLayout(ContactLayout):
         upright = self.steps.normals[steps, 2, None]
         area = (over_ground.area + over_ground.beyond) / upright
         factors = cells.factors(window)
-        landing_speed = self._landing_drop / step
+        landing_speed, firmness = self._landing_drop / step, material.firmness(self._width)
+        softness = None
+        if factors:
+            under = window.cells_under(*places(points, poses), cells.cell_size)
+            softness = factors.softness(material.exponent)[under]
         sinking = sink(
             over_ground.clearance,
             area,
@@ -63,7 +68,8 @@ class SoleLayout(ContactLayout):
             material=material,
             sinkage=sinkage,
             landing_speed=landing_speed,
-            softness=factors.softness[window.cells_under(*places(points, poses), cells.cell_size)] if factors else None,
+            firmness=firmness,
+            softness=softness,
         )
         fraction = touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
         printing = over_ground.area / upright * fraction
@@ -86,7 +92,7 @@ class SoleLayout(ContactLayout):
             stress = stress[:, None, None]
         target = sinking.target
         if stress.ndim > 1:
-            target = target_compression(stress, material, **layer_factors(factors))
+            target = target_compression(stress, material, firmness=firmness, **layer_factors(factors))
         return Imprints(
             start,
             1,
@@ -121,7 +127,10 @@ class SoleLayout(ContactLayout):
             return stress
         x, y = places(self.points, self.steps.poses[steps])
         field = pressure_field(x, y, touching, self.steps.centres[steps, :2], self.points.tolerance)
-        over_cells: Array = stress[:, None, None] * field.over(*window.centres(cells.cell_size))
+        relative = field.over(*window.centres(cells.cell_size))
+        if cells.material.spread:
+            spread_out(relative, cells.material.spread * sinking.sinkage / self._length)
+        over_cells: Array = stress[:, None, None] * relative
         return over_cells
 
     @property

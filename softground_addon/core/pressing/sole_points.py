@@ -11,8 +11,9 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Surface, Window
-from ..motion.motion import Sole, SolePatch
+from ..ground.heightfield import Surface
+from ..ground.sparse_grid import Window
+from ..motion.sole_motion import Sole, SolePatch
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction
@@ -66,6 +67,11 @@ class SolePoints:
 
     patches: tuple[PatchPoints, ...]
     length: float
+
+    @property
+    def width(self) -> float:
+        """Mean width [m]."""
+        return sum(float(patch.area.sum()) for patch in self.patches) / self.length
 
     @property
     def tolerance(self) -> float:

@@ -8,9 +8,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField
 from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import SparseGrid, Window
 from ..record.footprints import FootprintRecorder, quantised
 from .deformation import compress
 from .ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
@@ -58,16 +59,39 @@ class GroundSolver:
         """Side of a cell [m]."""
         return self.state.cell_size
 
-    def advance(
-        self, contacts: Sequence[OpenContact], start: int, end: int, frame: float, timing: Timing
-    ) -> tuple[Window, ...]:
-        """Press the steps from start to before end; where contacts share ground, all of them step by step.
+    def step(
+        self, contacts: list[OpenContact], start: int, end: int, frame: float, timing: Timing, *, is_last: bool = False
+    ) -> tuple[tuple[Window, ...], list[OpenContact]]:
+        """Press the steps of a recorded frame, from start to before end, and let go of the contacts that end in it.
+
+        Parameters
+        ----------
+        contacts : list of OpenContact
+            Those that are open by its end; at last without those that have ended.
+        start, end : int
+        frame : float
+            Scene frame.
+        timing : Timing
+        is_last : bool
+            All contacts end.
 
         Returns
         -------
-        tuple of Window
+        changed : tuple of Window
             Where the ground may have changed.
+        ended : list of OpenContact
         """
+        changed = self._advance(contacts, start, end, frame, timing)
+        ended = [contact for contact in contacts if contact.layout.end <= end or is_last]
+        for contact in ended:
+            contacts.remove(contact)
+            changed += self._settle(contact, frame)
+        return changed, ended
+
+    def _advance(
+        self, contacts: Sequence[OpenContact], start: int, end: int, frame: float, timing: Timing
+    ) -> tuple[Window, ...]:
+        """Press the steps from start to before end; where contacts share ground, all of them step by step."""
         parts = []
         self.contact = []
         for contact in contacts:
@@ -84,7 +108,7 @@ class GroundSolver:
                     windows += self._press(contact, imprints, max(first, begin), min(last, stop), frame, timing)
         return tuple(windows)
 
-    def settle(self, contact: OpenContact, frame: float) -> tuple[Window, ...]:
+    def _settle(self, contact: OpenContact, frame: float) -> tuple[Window, ...]:
         """Let slide what a contact that has ended left too steep; where the ground may have changed by that."""
         if not self.material.repose_angle or contact.recorder is None:
             return ()

@@ -11,8 +11,9 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField
 from ..ground.soft_ground import Weathering
+from ..ground.sparse_grid import SparseGrid, Window
 from .ground_cells import Imprints
 
 Array = NDArray[np.float64]

@@ -1,1 +1,1 @@
-"""What a bake leaves: footprints, their bytes, and the ground that they make."""
+"""Record of a bake: footprints, their bytes, and the ground that they make."""

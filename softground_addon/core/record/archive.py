@@ -25,11 +25,11 @@ def most_of(size: int) -> int:
 
 
 def check_directory(archive: zipfile.ZipFile, size: int) -> None:
-    """Raise ValueError unless the directory of an archive of that size [bytes] announces what can be unpacked.
+    """Raise ValueError unless the directory of an archive of that size [bytes] announces parts that can be unpacked.
 
     Notes
     -----
-    `read` takes no more of a member than is announced, so that this bounds what all of them take.
+    `read` takes no more of a member than is announced, so that this bounds the memory of all.
     """
     if len(archive.infolist()) != len(archive.NameToInfo):
         raise ValueError("two of its parts have one name")
@@ -57,7 +57,7 @@ def array(member: bytes) -> NDArray[Any]:
     Raises
     ------
     ValueError
-        If the member's header and its size do not fit each other; of what numpy cannot read, also SyntaxError,
+        If the member's header and its size do not fit each other; if numpy cannot read it, also SyntaxError,
         `tokenize.TokenError` and MemoryError.
     """
     stream = io.BytesIO(member)

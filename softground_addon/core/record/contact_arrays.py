@@ -1,4 +1,4 @@
-"""What pressed the footprints of a record, as texts and flat arrays and back, checked like the footprints."""
+"""Contacts of the footprints of a record, as texts and flat arrays and back, checked like the footprints."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Sole, SolePatch
 from ..motion.props import Prop
+from ..motion.sole_motion import Sole, SolePatch
 from .contact_steps import LENGTH, ContactSteps, PressingSole, coded, decoded, patch_of, width_of
 
 Array = NDArray[np.float64]
@@ -32,31 +32,31 @@ Columns = dict[str, list[NDArray[Any]]]
 
 
 def to_columns(contacts: Sequence[ContactSteps | None]) -> tuple[list[dict[str, str]], Columns]:
-    """What pressed each footprint: the names of the soles, and the parts of each of the arrays of `KINDS`."""
+    """Contact of each footprint: the names of the soles, and the parts of each of the arrays of `KINDS`."""
     soles: dict[int, tuple[int, PressingSole]] = {}
     numbers: list[Array] = []
-    for one in contacts:
+    for contact in contacts:
         values = np.full(_OF_STEPS, -1.0)
-        if one is not None:
-            number, _ = soles.setdefault(id(one.pressing), (len(soles), one.pressing))
-            values[:4] = number, one.first, one.approach, one.time_step
-            values[4:7], values[7], values[8] = one.origin, one.peak, one.count
+        if contact is not None:
+            number, _ = soles.setdefault(id(contact.pressing), (len(soles), contact.pressing))
+            values[:4] = number, contact.first, contact.approach, contact.time_step
+            values[4:7], values[7], values[8] = contact.origin, contact.peak, contact.count
         numbers.append(values)
-    kept = [pressing for _, pressing in soles.values()]
-    flat, maps = zip(*map(sole_to_arrays, kept), strict=True) if kept else ((), ())
+    pressing = [sole for _, sole in soles.values()]
+    flat, maps = zip(*map(sole_to_arrays, pressing), strict=True) if pressing else ((), ())
     columns: Columns = {
         "contact.numbers": list(numbers),
-        "contact.coded": [one.coded for one in contacts if one is not None],
+        "contact.coded": [contact.coded for contact in contacts if contact is not None],
         "soles.numbers": list(flat),
         "soles.coded": list(maps),
     }
-    return [{"name": one.sole.name, "side": one.sole.side} for one in kept], columns
+    return [{"name": each.sole.name, "side": each.sole.side} for each in pressing], columns
 
 
 def from_columns(
     names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any], count: int
 ) -> list[ContactSteps | None]:
-    """What pressed each of `count` footprints, from what `to_columns` gave, each array put together.
+    """Contact of each of `count` footprints, from the result of `to_columns`, each array put together.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def from_columns(
 
 
 def sole_from_arrays(name: str, numbers: Array, maps: NDArray[np.int32]) -> PressingSole:
-    """One sole from what `sole_to_arrays` gave; ValueError where the parts do not fit each other."""
+    """One sole from the arrays of `sole_to_arrays`; ValueError where the parts do not fit each other."""
     readers = _Reader(numbers), _Reader(maps)
     pressing = _sole({"name": name, "side": ""}, *readers)
     for reader in readers:
@@ -98,7 +98,7 @@ def _contact(row: Array, soles: Sequence[PressingSole], steps: _Reader) -> Conta
 
 
 def sole_to_arrays(pressing: PressingSole) -> tuple[Array, NDArray[np.int32]]:
-    """The numbers of a sole [m], and what is coded of it in units of `LENGTH`."""
+    """The numbers of a sole [m], and its coded lengths in units of `LENGTH`."""
     sole, prop = pressing.sole, pressing.sole.prop
     numbers: list[Any] = [len(pressing.flat), pressing.flat, len(sole.landmarks), sole.landmarks, sole.landmark_patch]
     numbers += [len(sole.outline), sole.outline, len(sole.patches)]
@@ -115,14 +115,14 @@ def sole_to_arrays(pressing: PressingSole) -> tuple[Array, NDArray[np.int32]]:
 
 
 def _sole(name: Mapping[str, str], numbers: _Reader, maps: _Reader) -> PressingSole:
-    parts = _whole(numbers.one(), 1, MOST_PATCHES)
+    parts = _whole(numbers.single(), 1, MOST_PATCHES)
     flat = numbers.take(16 * parts).reshape(parts, 4, 4)
-    landmarks = _whole(numbers.one(), 0, 10_000)
+    landmarks = _whole(numbers.single(), 0, 10_000)
     marks = numbers.take(3 * landmarks).reshape(-1, 3)
     of_patch = np.array([_whole(value, 0, parts - 1) for value in numbers.take(landmarks)], np.intp)
-    outline = numbers.take(2 * _whole(numbers.one(), 0, 100_000)).reshape(-1, 2)
+    outline = numbers.take(2 * _whole(numbers.single(), 0, 100_000)).reshape(-1, 2)
     patches = tuple(_patches(numbers, maps))
-    vertices, triangles, give = _whole(numbers.one(), 0, 2**24), _whole(numbers.one(), 0, 2**24), numbers.one()
+    vertices, triangles, give = _whole(numbers.single(), 0, 2**24), _whole(numbers.single(), 0, 2**24), numbers.single()
     prop = None
     if vertices:
         places = decoded(maps.take(3 * vertices).reshape(-1, 3)) * LENGTH
@@ -136,16 +136,16 @@ def _sole(name: Mapping[str, str], numbers: _Reader, maps: _Reader) -> PressingS
 
 
 def _patches(numbers: _Reader, maps: _Reader) -> Iterator[SolePatch]:
-    for _ in range(_whole(numbers.one(), 0, MOST_PATCHES)):
+    for _ in range(_whole(numbers.single(), 0, MOST_PATCHES)):
         rows, columns = (_whole(value, 2, 2**16) for value in numbers.take(2))
-        origin, spacing = numbers.take(2), float(numbers.one())
+        origin, spacing = numbers.take(2), float(numbers.single())
         if not 1e-9 < spacing < 1e6:
             raise ValueError("a sole's map has no spacing")
         yield patch_of(maps.take(2 * rows * columns).reshape(2, rows, columns), origin, spacing)
 
 
 class _Reader:
-    """Takes an array apart from its beginning; ValueError where it is shorter than asked, or not read to its end."""
+    """Reads an array from its beginning; ValueError where it is too short, or not read to its end."""
 
     def __init__(self, values: NDArray[Any]) -> None:
         self._values, self._at = values, 0
@@ -158,7 +158,7 @@ class _Reader:
         self._at += count
         return taken.copy()
 
-    def one(self) -> float:
+    def single(self) -> float:
         """The next value."""
         return float(self.take(1)[0])
 

@@ -1,8 +1,8 @@
-"""What a sole did during a contact, kept with its footprint so that an edited step can be pressed again.
+"""Movement of a sole during a contact, stored with its footprint so that an edited step can be pressed again.
 
-Poses and loads are kept as whole multiples of small units, and of those the second differences over time: smooth motion
-then takes a byte or two a value. What was rounded once is the same ever after, in the session of the bake and in the
-file alike.
+Poses and loads are stored as whole multiples of small units, and of those the second differences over time: smooth
+motion then takes a byte or two a value. Values are rounded once and then stay the same, in the session of the bake and
+in the file alike.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Sole, SolePatch
 from ..motion.props import Prop
+from ..motion.sole_motion import Sole, SolePatch
 from ..numerics.orientation import quaternions, rotation_matrices
 from ..numerics.packed import Packed
 
@@ -28,7 +28,7 @@ TURN = 2.0**-22
 PARTS_OF_PEAK = 2**20
 """Units that the largest force of a contact is kept in."""
 _POSE = 7
-"""Values of a pose: where it is, and how it is turned."""
+"""Values of a pose: location and rotation."""
 _LOAD = 9
 """Values of a load: force, normal, centre of pressure."""
 _LARGEST = 2**31 - 1
@@ -36,7 +36,7 @@ _LARGEST = 2**31 - 1
 
 @dataclass(frozen=True)
 class Steps:
-    """What a sole does at N steps in a row.
+    """Movement of a sole at N steps in a row.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class PressingSole:
-    """A sole as it is kept, and how its patches lie to each other where it is flat.
+    """A sole as it is stored, and the poses of its patches while it is flat.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class PressingSole:
 
 
 def kept_sole(sole: Sole, flat: Array) -> PressingSole:
-    """A sole rounded to what the record keeps of it."""
+    """A sole rounded as the record stores it."""
     patches = tuple(
         replace(patch, heights=_rounded(patch.heights, LENGTH), signed_distance=_rounded(patch.signed_distance, LENGTH))
         for patch in sole.patches
@@ -92,18 +92,18 @@ def kept_sole(sole: Sole, flat: Array) -> PressingSole:
 
 @dataclass(frozen=True)
 class ContactSteps:
-    """The steps of one contact as they are kept.
+    """The steps of one contact as they are stored.
 
     Attributes
     ----------
     pressing : PressingSole
         Shared by all contacts of a sole.
     first, approach : int
-        Number of the first step, and of how many steps before it the poses are known.
+        Number of the first step, and of steps before it whose poses are known.
     time_step : float
         Duration of a step [s].
     origin : (3,) float array
-        That lengths are measured from [m].
+        Origin of lengths [m].
     peak : float
         Largest part of a force [N].
     coded : (K + N, P·7 + 9) int array, flat
@@ -158,7 +158,7 @@ def width_of(pressing: PressingSole) -> int:
 
 
 def kept_steps(pressing: PressingSole, steps: Steps, time_step: float) -> ContactSteps:
-    """The steps of a contact, rounded to what the record keeps of them."""
+    """The steps of a contact, rounded as the record stores them."""
     poses = np.concatenate([steps.approach, steps.poses])
     origin = np.round(steps.poses[0, 0, :3, 3])
     peak = float(np.abs(steps.forces).max()) or 1.0
@@ -186,7 +186,7 @@ def coded(values: Array) -> Whole:
 
 
 def decoded(differences: NDArray[Any]) -> Array:
-    """Values (N, ...) from what `coded` gave of them.
+    """Values (N, ...) from the result of `coded`.
 
     Examples
     --------

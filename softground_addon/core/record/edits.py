@@ -1,4 +1,4 @@
-"""What the artist changes of single steps, stored beside the footprints of a bake and kept when it is baked again.
+"""Edits of single steps, stored beside the footprints of a bake and kept when it is baked again.
 
 Steps are numbered as they were baked; copy number k of step n has the number n + k times the count of the baked ones.
 """
@@ -23,7 +23,7 @@ STRONGEST = 10.0
 FARTHEST = 100.0
 """Largest part of `StepEdit.move_m` [m]."""
 SMALLEST, LARGEST = 0.2, 5.0
-"""Between what `StepEdit.scale` is."""
+"""Least and largest `StepEdit.scale`."""
 LONGEST_SHIFT = 1000
 """Most frames of `StepEdit.shift_frames`, either way."""
 LONGEST_NAME = 200
@@ -43,13 +43,13 @@ class StepEdit:
     strength : float
         Its depth over that of the bake.
     move_m : (float, float)
-        How far it is moved along world x and y [m].
+        Displacement along world x and y [m].
     turn_deg : float
-        How far it is turned counter-clockwise around its position [deg].
+        Counter-clockwise turn around its position [deg].
     scale : float
         Size of its sole over that of the bake, at the same pressure.
     shift_frames : int
-        How many frames later it presses.
+        Frames by which it presses later.
     sole : str
         Character and contact whose sole presses it, such as `Fox/paw.L`, or the name of a mesh object; its own where
         empty, or not known.
@@ -85,7 +85,7 @@ def step_id(footprint: Footprint, copy: int = 0) -> str:
 def with_edit(
     edits: Mapping[str, StepEdit], footprint: Footprint, name: str, edit: StepEdit | None
 ) -> dict[str, StepEdit]:
-    """All edits, with another one of a step, or of a copy of it; or with none, without which a copy is gone.
+    """All edits, with a new one of a step or of a copy of it; None removes the edit and the copy.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ def with_edit(
     footprint : Footprint
         The step as it was baked.
     name : str
-        Its id, or that of the copy: what was stored under ids of an earlier bake goes.
+        Its id, or that of the copy: edits stored under ids of an earlier bake go.
     edit : StepEdit or None
     """
     _, _, copy = _parts(name)
-    others = {other: one for other, one in edits.items() if not _is_of(_parts(other), footprint, copy)}
+    others = {other: stored for other, stored in edits.items() if not _is_of(_parts(other), footprint, copy)}
     return others if edit is None else others | {name: edit}
 
 
@@ -119,12 +119,12 @@ def new_copy(edits: Mapping[str, StepEdit], footprint: Footprint) -> str:
 
 
 def is_copy(name: str) -> bool:
-    """Whether a step's id is that of a copy."""
+    """True if a step's id is that of a copy."""
     return _parts(name)[2] > 0
 
 
 def edits_by_number(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, StepEdit]:
-    """What the artist changed, by the number of the step; steps that are as they were baked are left out."""
+    """Edits by the number of the step, without those of unchanged steps."""
     names = sorted(_names(footprints, edits).items())
     return {n: edits[name] for n, name in names if edits[name] != UNCHANGED or n >= len(footprints)}
 
@@ -141,20 +141,20 @@ def without_sole(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit])
     return [name for name, edit in edits.items() if edit.sole not in known and edit.mesh is None]
 
 
-def sole_of(edit: StepEdit, own: PressingSole, known: Mapping[str, PressingSole]) -> PressingSole:
+def sole_of(edit: StepEdit, baked: PressingSole, known: Mapping[str, PressingSole]) -> PressingSole:
     """The sole that presses a step.
 
     Parameters
     ----------
     edit : StepEdit
-    own : PressingSole
+    baked : PressingSole
         That made the step: a foot may be swapped, a prop may not.
     known : mapping of str to PressingSole
         From `feet`.
     """
-    if own.sole.prop is not None:
-        return own
-    return known.get(edit.sole) or (edit.mesh.pressing if edit.mesh else own)
+    if baked.sole.prop is not None:
+        return baked
+    return known.get(edit.sole) or (edit.mesh.pressing if edit.mesh else baked)
 
 
 def mesh_soles(edits: Mapping[str, StepEdit]) -> dict[str, MeshSole]:
@@ -163,14 +163,30 @@ def mesh_soles(edits: Mapping[str, StepEdit]) -> dict[str, MeshSole]:
 
 
 def with_meshes(edits: Mapping[str, StepEdit], meshes: Mapping[str, MeshSole]) -> dict[str, StepEdit]:
-    """Edits with other soles of the meshes that they name; where none is known, with what they keep."""
+    """Edits with other soles of the meshes that they name; where none is known, with their stored ones."""
     return {name: replace(edit, mesh=meshes.get(edit.sole, edit.mesh)) for name, edit in edits.items()}
+
+
+def with_names(edits: Mapping[str, StepEdit], names: Mapping[str, str]) -> dict[str, StepEdit]:
+    """Edits of characters that have other names by now, and the same by the soles that press.
+
+    Examples
+    --------
+    >>> with_names({"Walker/foot.L@36.5": StepEdit(sole="Fox/paw.L")}, {"Walker": "Ann", "Fox": "Reynard"}).keys()
+    dict_keys(['Ann/foot.L@36.5'])
+    """
+
+    def now(text: str) -> str:
+        before = next((name for name in names if text.startswith(f"{name}/")), None)
+        return text if before is None else names[before] + text.removeprefix(before)
+
+    return {now(name): replace(edit, sole=now(edit.sole)) for name, edit in edits.items()}
 
 
 def feet(footprints: Sequence[Footprint]) -> dict[str, PressingSole]:
     """Soles that may press the steps of other feet, by the names that `StepEdit.sole` calls them."""
     made_by = {sole_id(footprint): footprint.pressed_by for footprint in footprints}
-    return {name: one.pressing for name, one in made_by.items() if one is not None and one.pressing.sole.prop is None}
+    return {name: by.pressing for name, by in made_by.items() if by is not None and by.pressing.sole.prop is None}
 
 
 def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, str]:
@@ -197,7 +213,7 @@ def _is_of(parts: tuple[str, float, int], footprint: Footprint, copy: int) -> bo
 
 
 def _parts(name: str) -> tuple[str, float, int]:
-    """Character and sole, frame, and number of the copy that an id says; ValueError where it is none."""
+    """Character and sole, frame, and number of the copy in an id; ValueError where it is none."""
     who, _, when = name.rpartition("@")
     frame, plus, copy = when.partition("+")
     number = int(copy) if plus else 0
@@ -207,7 +223,7 @@ def _parts(name: str) -> tuple[str, float, int]:
 
 
 def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
-    """The edits for JSON, with the soles of meshes that they need; what is unchanged is left out.
+    """The edits for JSON, with the soles of meshes that they need, without unchanged fields.
 
     Examples
     --------
@@ -223,7 +239,7 @@ def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
 
 
 def edit_as_json(edit: StepEdit) -> dict[str, Any]:
-    """What one edit changes, for JSON; of a mesh, its name.
+    """Changes of one edit, for JSON; of a mesh, its name.
 
     Examples
     --------
@@ -238,14 +254,14 @@ def edit_as_json(edit: StepEdit) -> dict[str, Any]:
 
 
 def from_json(content: object, origin: str) -> dict[str, StepEdit]:
-    """The edits from what `to_json` gave.
+    """The edits from the result of `to_json`.
 
     Parameters
     ----------
     content : object
         Of the JSON.
     origin : str
-        What error messages call it.
+        Its name in error messages.
 
     Raises
     ------
@@ -315,7 +331,7 @@ _VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
         f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
     ),
 }
-"""What the fields of an edit may be, and how that is said."""
+"""Checks of the fields of an edit, and their words in messages."""
 _KINDS: dict[str, Callable[[Any], Any]] = {
     "mute": bool,
     "strength": float,

@@ -1,4 +1,4 @@
-"""The record of footprints as a few flat arrays and back, with a check that what comes back fits together."""
+"""The record of footprints as a few flat arrays and back, with a check that the arrays fit together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.heightfield import Window
+from ..ground.sparse_grid import Window
 from . import contact_arrays
 from .contact_steps import ContactSteps
 from .footprints import Changes, Footprint
@@ -46,26 +46,26 @@ ARRAYS = ("numbers", *_VECTORS, *_SERIES, *(f"{key}.count" for key in _SERIES), 
 """Names of the arrays that a record is stored as."""
 
 _RANGES = {
-    "cell_size": (1e-5, 10.0),  # [m], around what can be set
+    "cell_size": (1e-5, 10.0),  # [m], wider than the setting's range
     "frame_step": (1e-3, 1e3),
     "start_frame": (-1e7, 1e7),  # beyond the 1,048,574 frames that Blender counts
     "end_frame": (-1e7, 1e7),
     "area_m2": (0.0, 1e9),
     "peak_force_n": (0.0, 1e15),
 }
-"""Between what a footprint's numbers are: what is far from it would only fill the memory."""
+"""Range of a footprint's numbers: others, far from it, would only fill the memory."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """An array of the record, of which only the part that is looked at takes memory.
+    """An array of the record in parts, of which one at a time takes memory.
 
     Attributes
     ----------
     kind : type
         Of its values.
     size : int
-        How many they are.
+        Number of its values.
     parts : iterable of (N,) arrays
         To be put together one after the other.
     """
@@ -76,7 +76,7 @@ class Parts:
 
     @classmethod
     def whole(cls, values: Sequence[object], kind: type) -> Parts:
-        """Those of values that are there already."""
+        """Parts of values that exist already."""
         flat: NDArray[Any] = np.array(values, kind).ravel()
         return cls(kind, len(flat), [flat])
 
@@ -93,8 +93,8 @@ def to_parts(
     soles : list of dict
         Name and side of each sole that pressed them.
     arrays : dict of str to Parts
-        `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count` saying
-        how many of its values belong to each footprint.
+        `numbers`, `position` and `window` are of all footprints; so is each series, with the number of values of each
+        footprint in `<series>.count`.
     """
     names = [{key: getattr(footprint, key) for key in _TEXTS} for footprint in footprints]
     numbers = [[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]
@@ -114,7 +114,7 @@ def to_parts(
 def from_arrays(
     names: Sequence[Mapping[str, str]], soles: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]
 ) -> list[Footprint]:
-    """The record from what `to_parts` gave, each array put together.
+    """The record from the result of `to_parts`, each array put together.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def _check(footprint: Footprint) -> None:
 
 
 def _check_ranges(footprint: Footprint) -> None:
-    """Raise ValueError where a footprint's numbers, or its frames, are far from what they can be."""
+    """Raise ValueError where a footprint's numbers, or its frames, are far out of range."""
     for name, (least, most) in _RANGES.items():
         if not least <= getattr(footprint, name) <= most:
             raise ValueError(f"{name} is {getattr(footprint, name):g}")

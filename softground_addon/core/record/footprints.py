@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField
+from ..ground.sparse_grid import SparseGrid, Window
 from ..numerics.packed import Packed
 from .contact_steps import ContactSteps
 
@@ -33,7 +34,7 @@ NEVER = -1.0
 
 @dataclass(frozen=True)
 class Changes:
-    """How one quantity of a footprint's cells changed over time.
+    """Changes of one quantity of a footprint's cells over time.
 
     Attributes
     ----------
@@ -55,12 +56,12 @@ class Changes:
 
 @dataclass(frozen=True)
 class Footprint:
-    """What one contact of a sole did to the ground.
+    """Effect of one contact of a sole on the ground.
 
     Attributes
     ----------
     character, sole : str
-        Names of who left it and with what.
+        Names of its character and of the sole.
     start_frame, end_frame : float
         First and last scene frame of the contact.
     position : (3,) float array
@@ -84,13 +85,13 @@ class Footprint:
     window : Window
         The cells that its changes refer to.
     compression, rim : Changes
-        What it compressed and raised.
+        Changes of compression and rim.
     contact_cells : (C,) int array
         Cells that it touched, row·columns + column.
     contact_start, contact_end : (C,) float arrays
         First and last scene frame at which it touched each of them.
     pressed_by : ContactSteps or None
-        What the sole did, to press it again elsewhere; None of a print that was itself edited, and of old records.
+        Movement of the sole, to press it again elsewhere; None of a print that was itself edited, and of old records.
     """
 
     character: str
@@ -139,7 +140,7 @@ class Footprint:
 
     @property
     def pressing(self) -> Changes:
-        """What the contact itself compressed, without what weather had done there before."""
+        """Compression by the contact itself, without that by weather before it."""
         changes = self.compression
         began = self.contact_start[:].min(initial=np.inf) - 0.5 * self.frame_step
         count = int(np.searchsorted(changes.frames, began)) if len(self.contact_start) else 0
@@ -151,7 +152,7 @@ class Footprint:
 
     @property
     def max_depth_m(self) -> float:
-        """Deepest that this contact compressed a cell by [m], on top of what earlier ones had."""
+        """Largest compression of a cell by this contact [m], on top of earlier ones."""
         return float(self.tile(self.pressing).max(initial=0.0))
 
 
@@ -161,7 +162,7 @@ def quantised(heights: Array) -> NDArray[np.int64]:
 
 
 class FootprintRecorder:
-    """Collects what one contact does, frame by frame.
+    """Collects the effect of one contact, frame by frame.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ class FootprintRecorder:
         Parameters
         ----------
         **what
-            All fields of `Footprint` that say who, when, where and how hard.
+            All other fields of `Footprint`: names, times, place and load.
         """
         union = self.window
         frames = np.array(self._frames)
@@ -241,9 +242,9 @@ class FootprintRecorder:
     def _combined(self, channel: list[Any], frames: Array, union: Window) -> Changes:
         cells, counts = self._gather([cells for cells, _ in channel], union)
         amounts = np.concatenate([amounts for _, amounts in channel])
-        some = counts > 0
-        first = np.concatenate([[0], np.cumsum(counts[some])]).astype(np.int32)
-        return Changes(frames[some], first, cells, amounts)
+        changed = counts > 0
+        first = np.concatenate([[0], np.cumsum(counts[changed])]).astype(np.int32)
+        return Changes(frames[changed], first, cells, amounts)
 
     def _gather(self, cells_of_windows: list[NDArray[np.intp]], union: Window) -> tuple[Indices, NDArray[np.intp]]:
         """Cells of the single windows as cells of their union, one after the other, and how many of each."""
@@ -257,8 +258,8 @@ class FootprintRecorder:
 
 
 def extent(footprints: Iterable[Footprint]) -> tuple[Array, Array]:
-    """Lower and upper corner of the box around all footprints, of which there are some, (2,) each [m]."""
-    lows, highs = zip(*(one.window.corners(one.cell_size) for one in footprints), strict=True)
+    """Lower and upper corner of the box around at least one footprint, (2,) each [m]."""
+    lows, highs = zip(*(each.window.corners(each.cell_size) for each in footprints), strict=True)
     return np.min(lows, axis=0), np.max(highs, axis=0)
 
 

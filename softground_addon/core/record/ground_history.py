@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import Terrain, Window
+from ..ground.heightfield import Terrain
+from ..ground.sparse_grid import Window
 from .footprints import QUANTUM, Changes, Footprint
 
 Array = NDArray[np.float64]
@@ -94,9 +95,9 @@ def _series(footprint: Footprint) -> _Print:
 
 def _bilinear(footprint: _Print, step: NDArray[np.intp], u: Array, v: Array) -> Array:
     window = footprint.window
-    left, low = np.floor(u).astype(int), np.floor(v).astype(int)
+    first, low = np.floor(u).astype(int), np.floor(v).astype(int)
     result = np.zeros(len(u))
-    for i, part_u in ((left, 1 - (u - left)), (left + 1, u - left)):
+    for i, part_u in ((first, 1 - (u - first)), (first + 1, u - first)):
         for j, part_v in ((low, 1 - (v - low)), (low + 1, v - low)):
             inside = (i >= 0) & (i < window.columns) & (j >= 0) & (j < window.rows)
             cell = np.where(inside, j * window.columns + i, 0)

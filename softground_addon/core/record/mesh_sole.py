@@ -1,4 +1,4 @@
-"""Soles cut from any mesh, as edits of steps keep them: whoever has the edits needs the mesh no more."""
+"""Soles cut from any mesh, as edits of steps store them: the mesh is not needed any more."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..motion.motion import Array, Sole
+from ..motion.motion import Array
+from ..motion.sole_motion import Sole
 from .contact_arrays import sole_from_arrays, sole_to_arrays
 from .contact_steps import PressingSole, kept_sole
 
 SHORTEST, LONGEST = 0.005, 10.0
-"""Between what a sole from a mesh is long [m]: others are mostly of a file in other units."""
+"""Range of a mesh sole's length [m]: others are mostly of a file in other units."""
 _MOST = 2**20
 """Most numbers that are read of one: a sole of a mesh has some thousands."""
 
@@ -45,12 +46,12 @@ class MeshSole:
 
     @classmethod
     def of(cls, sole: Sole, flat: Array) -> MeshSole:
-        """A sole whose patches lie so, (P, 4, 4), rounded to what is kept of it."""
+        """A sole whose patches lie so, (P, 4, 4), rounded as it is stored."""
         numbers, coded = sole_to_arrays(kept_sole(sole, flat))
         return cls(sole.name, numbers.tobytes(), coded.tobytes())
 
     def to_json(self) -> dict[str, list[float]]:
-        """For JSON."""
+        """The sole for JSON."""
         return {
             "numbers": np.frombuffer(self.numbers).tolist(),
             "coded": np.frombuffer(self.coded, np.int32).tolist(),
@@ -58,7 +59,7 @@ class MeshSole:
 
 
 def from_json(name: str, content: object, where: str) -> MeshSole:
-    """A sole from what `MeshSole.to_json` gave.
+    """A sole from the result of `MeshSole.to_json`.
 
     Raises
     ------

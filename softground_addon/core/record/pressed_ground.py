@@ -1,4 +1,4 @@
-"""The ground of a bake at one frame, ready to be looked up at any place: raw, blurred, and what shading needs."""
+"""The ground of a bake at one frame, ready to be looked up at any place: raw, blurred, and for shading."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred, gaussian_kernel
-from ..ground.heightfield import PLACES_AT_ONCE, TILE, HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField
+from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window
 from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
@@ -60,7 +61,7 @@ class GroundSample:
 
 @dataclass(frozen=True)
 class Trail:
-    """Where a ground has changed, without how: far smaller than the ground.
+    """Cells in which a ground has changed, without the amounts: far smaller than the ground.
 
     Attributes
     ----------
@@ -81,7 +82,7 @@ class Trail:
     cell_size: float
 
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
+        """True for places (N,) where the ground has changed, to the reach of a look-up."""
         return _covers(self.touched, self.cell_size, x, y)
 
 
@@ -130,13 +131,13 @@ class PressedGround:
         return PressedGround(raw, blurred(raw, blur_sigma), contact, frame, frame_rate)
 
     def trail(self, floor: float) -> Trail:
-        """Where the ground has changed, and where its displayed height did by more than a floor [m]."""
+        """Cells in which the ground has changed, and its displayed height by more than a floor [m]."""
         moved = _cells((tile, values.sum(axis=0) > floor) for tile, values in self.smooth.tiles.items())
         printed = _cells((tile, values[0] > 0) for tile, values in self.raw.tiles.items())
         return Trail(self._touched(), moved, printed, self.smooth.cell_size)
 
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
+        """True for places (N,) where the ground has changed, to the reach of a look-up."""
         return _covers(self._touched(), self.smooth.cell_size, x, y)
 
     def _touched(self) -> Keys:

@@ -19,40 +19,19 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..numerics.slices import Slices, sliced
 from . import archive as members
-from . import contact_arrays
 from . import edits as step_edits
 from . import throws as step_throws
 from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
 
-FORMAT = 5
-"""Version of the bytes' layout. Who raises it adds to `MIGRATIONS` what lifts the version before."""
+FORMAT = 1
+"""Version of the bytes' layout. A new one needs a migration from the one before in `MIGRATIONS`."""
 
 Layout = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 """The JSON text and the arrays of a record."""
 
-
-def _with_edits(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Layout:
-    return text | {"edits": step_edits.to_json({})}, arrays
-
-
-def _without_contacts(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Layout:
-    count = len(text["footprints"])
-    _, columns = contact_arrays.to_columns([None] * count)
-    empty = {
-        key: np.concatenate([np.empty(0), *columns[key]]).astype(kind) for key, kind in contact_arrays.KINDS.items()
-    }
-    return text | {"soles": [], "pressed_again": []}, arrays | empty
-
-
-MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {
-    1: _with_edits,
-    2: _without_contacts,
-    3: lambda text, arrays: (text, arrays),
-    4: lambda text, arrays: (text | {"throws": [], "thrown": []}, arrays),
-}
-"""What lifts a layout of a version to the next. Version 1 had no edits, version 2 nothing to press steps again from,
-version 3 no copies of steps, version 4 not what steps throw."""
+MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {}
+"""Migrations to the next version, by the version that they start from."""
 
 _TEXT = "record.json"
 _DAMAGE = (
@@ -65,9 +44,9 @@ _DAMAGE = (
         OverflowError,
     ),  # of the archive: "encrypted" too
     *(KeyError, ValueError, TypeError),  # of the text; too deep a nesting is a RuntimeError
-    *(SyntaxError, tokenize.TokenError, MemoryError),  # of an array's header: what numpy cannot read, and absurd sizes
+    *(SyntaxError, tokenize.TokenError, MemoryError),  # of an array's header: unreadable to numpy, or absurd sizes
 )
-"""What reading a damaged record may raise."""
+"""Errors that reading a damaged record may raise."""
 
 TAIL = 4096
 """Records that differ do so in their last bytes: the archive's directory is there, with a checksum of everything."""
@@ -77,23 +56,22 @@ _FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
 
 @dataclass(frozen=True)
 class BakeRecord:
-    """What a bake leaves: from it the ground at any frame is made again without simulating.
+    """Record of a bake, from which the ground at any frame is made again without simulating.
 
     Attributes
     ----------
     footprints : sequence of Footprint
         As they were baked.
     about : mapping
-        What is known about them: numbers and texts, for JSON.
+        Facts about them: numbers and texts, for JSON.
     edits : mapping of step id to StepEdit
-        What the artist changed of them.
+        Changes by the artist.
     pressed_again : mapping of int to Footprint or None
-        What stands for some of the footprints and for copies of them because of the edits, by their numbers (see
-        `edits`); None where nothing of one is left.
+        Footprints in place of edited ones, and copies, by their numbers (see `edits`); None of one that vanished.
     throws : sequence of Throw
-        How the baked steps throw.
+        Throws of the baked steps.
     thrown : mapping of int to mapping of str to float
-        What the steps as they were left have thrown, by their numbers and by phase [m³]: it is missing from the rims of
+        Volumes that the edited steps have thrown, by their numbers and by phase [m³]: they are missing from the rims of
         `edited` and `steps`, not from those of `footprints` and `pressed_again`.
     """
 
@@ -106,12 +84,12 @@ class BakeRecord:
 
     @property
     def edited(self) -> list[Footprint]:
-        """The footprints as the artist left them, in their order: those that the ground is made from."""
-        left = [step.left for step in self.steps if step.left is not None]
-        return sorted(left, key=lambda footprint: footprint.start_frame) if self.edits else left
+        """The footprints after the artist's edits, in their order: those that the ground is made from."""
+        prints = [step.left for step in self.steps if step.left is not None]
+        return sorted(prints, key=lambda footprint: footprint.start_frame) if self.edits else prints
 
     def with_about(self, about: Mapping[str, Any]) -> BakeRecord:
-        """The same steps, of which nothing is worked out again, and something else about them."""
+        """The same record with other facts about its steps, of which nothing is computed again."""
         twin = copy(self)
         object.__setattr__(twin, "about", about)
         return twin
@@ -133,13 +111,13 @@ class EditableStep:
     index : int
         See `edits`.
     baked : Footprint
-        As it was baked; of a copy, that which it is a copy of.
+        As it was baked; of a copy, its original.
     left : Footprint or None
-        As it was left, without what it threw; None where nothing of it is.
+        As it lies on the ground, without the thrown volume; None if nothing of it does.
     edit : StepEdit
     is_copy : bool
     thrown : mapping of str to float
-        What it threw, by phase [m³].
+        Thrown volumes by phase [m³].
     """
 
     name: str
@@ -162,10 +140,10 @@ def steps_of(
     steps = []
     for number in (*range(count), *(n for n in changes if n >= count)):
         edit, baked, copy = changes.get(number, step_edits.UNCHANGED), footprints[number % count], number // count
-        left = None if edit.mute else pressed_again.get(number, None if copy else baked)
-        lacking = thrown.get(number, {}) if left else {}
-        left = step_throws.booked(left, sum(lacking.values())) if left and lacking else left
-        steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, left, edit, copy > 0, lacking))
+        edited = None if edit.mute else pressed_again.get(number, None if copy else baked)
+        lacking = thrown.get(number, {}) if edited else {}
+        edited = step_throws.booked(edited, sum(lacking.values())) if edited and lacking else edited
+        steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, edited, edit, copy > 0, lacking))
     return steps
 
 
@@ -182,7 +160,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         "edits": step_edits.to_json(record.edits),
         "soles": soles,
         "pressed_again": [[number, footprint is not None] for number, footprint in again],
-        "throws": [step_throws.to_json(one) for one in record.throws],
+        "throws": [step_throws.to_json(throw) for throw in record.throws],
         "thrown": [[number, dict(volumes)] for number, volumes in sorted(record.thrown.items())],
     }
     buffer = io.BytesIO()
@@ -204,7 +182,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
 
 
 def load(content: bytes) -> BakeRecord:
-    """The record from what `dump` of this or an earlier version gave.
+    """The record from the bytes of `dump` of this or an earlier version.
 
     Raises
     ------
@@ -226,12 +204,11 @@ def load(content: bytes) -> BakeRecord:
                 )
             if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
                 raise ValueError("it has parts that no record has")
-            known = ARRAYS if version > 2 else set(ARRAYS) - set(contact_arrays.KINDS)
-            arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in known}
+            arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in ARRAYS}
         for older in range(version, FORMAT):
             text, arrays = MIGRATIONS[older](text, arrays)
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
-        soles, again = text["soles"], [(number, there) for number, there in text["pressed_again"]]
+        soles, again = text["soles"], [(number, has_print) for number, has_print in text["pressed_again"]]
         baked = _count_baked(len(names), again)
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
@@ -242,31 +219,31 @@ def load(content: bytes) -> BakeRecord:
     changes = step_edits.from_json(edits, "The stored record's edits of steps")
     footprints = from_arrays(names, soles, arrays)
     prints = iter(footprints[baked:])
-    pressed_again = {number: next(prints) if there else None for number, there in again}
+    pressed_again = {number: next(prints) if has_print else None for number, has_print in again}
     return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown)
 
 
 def _thrown(rows: list[Any], baked: int) -> dict[int, dict[str, float]]:
-    """What steps have thrown; ValueError where that cannot be."""
+    """Thrown volumes by step and phase; ValueError where that cannot be."""
     thrown = {
         number: {str(phase): float(volume) for phase, volume in dict(volumes).items()} for number, volumes in rows
     }
     if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in thrown):
-        raise ValueError("steps threw that it does not have")
+        raise ValueError("debris of steps that it does not have")
     if not all(0 <= volume < np.inf for volumes in thrown.values() for volume in volumes.values()):
-        raise ValueError("steps threw no volume")
+        raise ValueError("debris of no volume")
     return thrown
 
 
 def _count_baked(count: int, again: list[tuple[Any, Any]]) -> int:
-    """How many of so many footprints were baked, the others being pressed again; ValueError where that cannot be."""
-    baked = count - sum(there is True for _, there in again)
+    """Number of `count` footprints that were baked, the others being pressed again; ValueError where that cannot be."""
+    baked = count - sum(has_print is True for _, has_print in again)
     numbers = [number for number, _ in again]
     if (
         any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in numbers)
         or sorted(set(numbers)) != numbers
     ):
         raise ValueError("steps were pressed again that it does not have")
-    if any(type(there) is not bool for _, there in again):
+    if any(type(has_print) is not bool for _, has_print in again):
         raise ValueError("it does not say which steps are left")
     return baked

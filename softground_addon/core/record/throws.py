@@ -1,7 +1,6 @@
-"""What contacts throw, kept with their footprints: how soles land, push off and leave, whatever becomes of the prints.
+"""Throws of contacts, stored with their footprints: soles land, push off and leave, whatever becomes of the prints.
 
-From it and the prints as the artist leaves them debris is made again without the animation; volumes that were thrown
-are missing from the rims.
+Debris is made again from them and the edited prints, without the animation; thrown volumes are missing from the rims.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,39 +27,46 @@ WEIGHT, AIM, FOLLOWED = 0, slice(1, 4), 4
 """Columns of `Throw.samples`: see there."""
 _NUMBERS = ("first", "spacing", "speed", "landed_by")
 _LARGEST = 1e9
-"""Of any number that is stored: what is larger is damage."""
+"""Largest stored number: a larger one is damage."""
 _MOST_POINTS = 10_000
-"""Of a sole, as `contact_arrays` has them."""
+"""Most points of a sole, as in `contact_arrays`."""
+
+
+class ThrowKind(IntEnum):
+    """Where thrown matter comes from; a slide is a push."""
+
+    LANDING = 0
+    PUSH = 1
+    SHED = 2
 
 
 @dataclass(frozen=True)
 class Throw:
-    """What one contact throws as it lands, pushes off or leaves.
+    """Throw of one contact as it lands, pushes off or leaves.
 
     Attributes
     ----------
     number : int
         Of the footprint as it was baked.
     phase : str
-        See `core.after.phases`.
-    kind : int
-        See `core.after.debris.KINDS`.
+        See `core.events.phases`.
+    kind : ThrowKind
     is_foot : bool
-        Whether it has a heel and a ball to roll over.
+        True if it has a heel and a ball to roll over.
     first, spacing : float
         Scene frame of the first sample, and scene frames from one to the next.
     speed : float
         Of a landing, into the ground [m/s].
     landed_by : float
-        Scene frame until which what is compacted is compacted by the landing.
+        Scene frame until which the landing compacts the ground.
     samples : (K, 4 + 6·L) float array
-        At K times: how much is thrown, over what a print of its size throws in all; the unit vector that it is thrown
+        At K times: the share that is thrown, of all that a print of its size throws; the unit vector that it is thrown
         along, 0 where it goes with the sole; L points of the sole [m], and their velocities [m/s].
     """
 
     number: int
     phase: str
-    kind: int
+    kind: ThrowKind
     is_foot: bool
     first: float
     spacing: float
@@ -73,17 +80,17 @@ class Throw:
         points, velocities = samples.reshape(len(samples), 2, -1, 3).transpose(1, 0, 2, 3)
         return points, velocities
 
-    def placed(self, baked: Footprint, left: Footprint, edit: StepEdit) -> Throw:
+    def placed(self, baked: Footprint, edited: Footprint, edit: StepEdit) -> Throw:
         """The same of a step that the artist has moved, turned, scaled or shifted in time.
 
         Parameters
         ----------
-        baked, left : Footprint
-            The step as it was baked and as it was left.
+        baked, edited : Footprint
+            The step as it was baked and as it was edited.
         edit : StepEdit
         """
         shift = round(edit.shift_frames / baked.frame_step) * baked.frame_step
-        turn, moved = left.heading - baked.heading, left.position - baked.position
+        turn, moved = edited.heading - baked.heading, edited.position - baked.position
         if not (shift or turn or moved.any()) and edit.scale == 1.0:
             return self
         cos, sin = np.cos(turn), np.sin(turn)
@@ -91,7 +98,7 @@ class Throw:
         points, velocities = self.followed()
         samples = self.samples.astype(np.float64)
         samples[:, AIM] = samples[:, AIM] @ turned.T
-        points = left.position + edit.scale * (points - baked.position) @ turned.T
+        points = edited.position + edit.scale * (points - baked.position) @ turned.T
         velocities = edit.scale * velocities @ turned.T
         samples[:, FOLLOWED:] = np.stack([points, velocities], axis=1).reshape(len(samples), -1)
         return replace(
@@ -112,7 +119,7 @@ def to_json(throw: Throw) -> dict[str, Any]:
 
 
 def from_json(contents: Sequence[Mapping[str, Any]], count: int, largest: int) -> list[Throw]:
-    """The throws from what `to_json` gave of each.
+    """The throws from the result of `to_json` for each.
 
     Parameters
     ----------
@@ -127,50 +134,50 @@ def from_json(contents: Sequence[Mapping[str, Any]], count: int, largest: int) -
     ValueError, KeyError, TypeError, zlib.error
         If it was forged or damaged.
     """
-    shapes = [one["shape"] for one in contents]
+    shapes = [content["shape"] for content in contents]
     if any(type(size) is not int or size < 0 for shape in shapes for size in shape):
-        raise ValueError("it throws what has no size")
+        raise ValueError("debris has samples of no size")
     if sum(4 * rows * columns for rows, columns in shapes) > largest:
-        raise ValueError("it throws more than it can have")
-    return [_throw(one, count) for one in contents]
+        raise ValueError("debris is larger than the file")
+    return [_throw(content, count) for content in contents]
 
 
 def _throw(content: Mapping[str, Any], count: int) -> Throw:
     rows, columns = content["shape"]
     number, phase, kind, is_foot = (content[name] for name in ("number", "phase", "kind", "is_foot"))
     kinds = (type(number), type(phase), type(kind), type(is_foot))
-    if kinds != (int, str, int, bool) or not (0 <= number < count and 0 <= kind < 3):
+    if kinds != (int, str, int, bool) or not 0 <= number < count:
         raise ValueError("it throws what no step of it does")
     if not rows or not 0 < columns - FOLLOWED <= 6 * _MOST_POINTS or (columns - FOLLOWED) % 6:
-        raise ValueError("it throws along no way")
+        raise ValueError("debris along no path")
     unpacking, size = zlib.decompressobj(), 4 * rows * columns
     packed = base64.b64decode(content["samples"], validate=True)
     samples = np.frombuffer(unpacking.decompress(packed, size + 1), "<f4").reshape(rows, columns)
     numbers = {name: float(content[name]) for name in _NUMBERS}
     if not (np.abs([*numbers.values(), *samples.ravel()]) <= _LARGEST).all() or not (samples[:, WEIGHT] >= 0).all():
         raise ValueError("it throws what is no number")
-    return Throw(number, phase, kind, is_foot, **numbers, samples=samples.astype(np.float32))
+    return Throw(number, phase, ThrowKind(kind), is_foot, **numbers, samples=samples.astype(np.float32))
 
 
 def booked(footprint: Footprint, volume: float) -> Footprint:
-    """A footprint whose rim lacks what was thrown [m³]."""
+    """A footprint whose rim lacks the thrown volume [m³]."""
     volume = min(volume, footprint.rim_m3)
     if not volume > 0 or not footprint.rim_m3 > 0:
         return footprint
-    left = 1.0 - volume / footprint.rim_m3
+    remaining = 1.0 - volume / footprint.rim_m3
     amounts = np.asarray(footprint.rim.amounts)
     order = np.argsort(np.asarray(footprint.rim.cells), kind="stable")
     # Rounded along each cell's sums, so that no cell loses more than a quantum whatever it went through.
     total = np.cumsum(amounts[order].astype(np.int64))
-    rounded = np.diff(np.rint(total * left), prepend=0.0)
+    rounded = np.diff(np.rint(total * remaining), prepend=0.0)
     scaled = np.empty(len(amounts), np.int32)
     scaled[order] = rounded.astype(np.int32)
     return _changed(footprint, rim=_changed(footprint.rim, amounts=scaled), rim_m3=footprint.rim_m3 - volume)
 
 
-def _changed(one: _Part, **values: Any) -> _Part:
-    """As `dataclasses.replace`, which would pack anew what stays as it is."""
-    twin = copy(one)
+def _changed(part: _Part, **values: Any) -> _Part:
+    """Replace fields as `dataclasses.replace`, which would pack unchanged ones anew."""
+    twin = copy(part)
     for name, value in values.items():
         object.__setattr__(twin, name, value)
     return twin

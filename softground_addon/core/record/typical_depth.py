@@ -1,4 +1,4 @@
-"""How deep the typical step is: not the hardest landing, and not a hand that brushes the ground."""
+"""Depth of the typical step: not of the hardest landing, and not of a hand that brushes the ground."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 BORNE = 0.9
 """Share of the whole load that the main contacts bear."""
 SHOWS = 1e-4
-"""Depth from which on a print shows [m]: what comes down on a print that is there may add nothing."""
+"""Depth from which on a print shows [m]: a step into an earlier print may add nothing."""
 
 
 def main_contacts(impulse: Array) -> NDArray[np.bool_]:
@@ -38,9 +38,16 @@ def main_contacts(impulse: Array) -> NDArray[np.bool_]:
 
 
 def median_depth(depth: Array) -> float:
-    """Median depth of the contacts that left a print [m], 0 if there is none."""
+    """Median depth of the contacts that made a print [m], 0 if there is none."""
     shown = depth[depth > SHOWS]
     return float(np.median(shown)) if len(shown) else 0.0
+
+
+def typical_contacts(depth: Array, impulse: Array) -> NDArray[np.bool_]:
+    """The main contacts that left a print; where none of them did, all that left one."""
+    shown = depth > SHOWS
+    main = main_contacts(impulse) & shown
+    return main if main.any() else shown
 
 
 def typical_of(footprints: Sequence[Footprint]) -> float:
@@ -48,9 +55,9 @@ def typical_of(footprints: Sequence[Footprint]) -> float:
     steps = [footprint for footprint in footprints if not _is_of_body(footprint)] or footprints
     depths = np.array([footprint.max_depth_m for footprint in steps])
     impulse = np.array([float(footprint.load_n.sum()) for footprint in steps])
-    return median_depth(depths[main_contacts(impulse)]) or median_depth(depths)
+    return median_depth(depths[typical_contacts(depths, impulse)])
 
 
 def _is_of_body(footprint: Footprint) -> bool:
-    """Whether a ball, a hand or a head left it."""
+    """True if a ball, a hand or a head made it."""
     return footprint.pressed_by is not None and footprint.pressed_by.pressing.sole.prop is not None

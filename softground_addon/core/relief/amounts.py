@@ -1,4 +1,4 @@
-"""How much relief a ground shows: the amounts of all layers, from a table in JSON."""
+"""Amounts of the relief that a ground shows, layer by layer, from a table in JSON."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..ground import surfaces
 from .layers import Apron, Cracks, Crumbs, Edge, Fans, Fissures, Floor, Layer, Lip, Lumps, Streaks
 
 FOLDER = Path(__file__).parents[2] / "presets" / "relief"
-"""Where the amounts of each look are, as `LOOK.json`."""
+"""Where the tables of amounts are that surfaces name."""
 
 LAYERS: Mapping[str, type[Layer]] = {
     "edge": Edge,
@@ -30,12 +31,12 @@ LAYERS: Mapping[str, type[Layer]] = {
 """The layers by the names that a table gives them; several of one kind are a list."""
 
 LARGEST = 1e4
-"""Of the numbers in a table [mm]."""
+"""Largest number in a table [mm]."""
 
 
 @dataclass(frozen=True)
 class Bend:
-    """By how much outlines are bent (`amount`), in bends of a `size` [mm]."""
+    """Bends of outlines, by an `amount` and of a `size` [mm]."""
 
     size: float
     amount: float
@@ -43,7 +44,7 @@ class Bend:
 
 @dataclass(frozen=True)
 class Chunks:
-    """Pieces of a `size` that are missing from the edge, or were left standing, by up to about half of `shift` [mm]."""
+    """Pieces of a `size` that are missing from the edge, or still stand, by up to about half of `shift` [mm]."""
 
     size: float
     shift: float
@@ -52,7 +53,7 @@ class Chunks:
 
 @dataclass(frozen=True)
 class Tread:
-    """Height of what a tread leaves standing [mm], and the parts of it that are lost in the best and worst places."""
+    """Height of a tread's ridges [mm], and the parts of it that are lost in the best and worst places."""
 
     height: float
     kept: float = 0.0
@@ -78,10 +79,10 @@ class Amounts:
     bends : tuple of Bend
         Of the outline and all that lies along it.
     bends_with_depth : bool
-        Whether walls are bent at each depth otherwise.
+        True if walls are bent at each depth otherwise.
     chunks : Chunks or None
     ledges : tuple of Bend
-        By how much the wall stands out or back at each height of its own.
+        Offsets of the wall, out or back, at each of its heights.
     wall : float
         Width of the wall seen from above; 0 keeps the walls that the simulation has.
     tread : Tread or None
@@ -89,7 +90,7 @@ class Amounts:
     layers : tuple of Layer
     crumbs : Crumbs or None
     surface : str
-        That the crumbs are of, see `core.ground.crumbs`.
+        That the crumbs are of, see `core.ground.surfaces`.
     """
 
     depth: float
@@ -114,7 +115,7 @@ def of_look(look: str, folder: Path = FOLDER) -> Amounts:
     InputError
         If there is no table of it, or it holds something else.
     """
-    path = folder / f"{look}.json"
+    path = folder / f"{surfaces.find(look).relief}.json"
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -143,7 +144,7 @@ def parse(text: str, origin: str, surface: str) -> Amounts:
     ]
     parts: dict[str, Any] = {}
     for name in ("bends", "ledges"):
-        parts[name] = tuple(_made(Bend, one, f"{origin}, {name}") for one in _list(table.pop(name, [])))
+        parts[name] = tuple(_made(Bend, bend, f"{origin}, {name}") for bend in _list(table.pop(name, [])))
     for name, kind in (("chunks", Chunks), ("tread", Tread), ("water", Water), ("crumbs", Crumbs)):
         if name in table:
             parts[name] = _made(kind, table.pop(name), f"{origin}, {name}")
@@ -159,7 +160,7 @@ def _list(values: Any) -> list[Any]:
 
 def _made(kind: type[Any], values: Any, origin: str) -> Any:
     """An instance of a dataclass of numbers from a table."""
-    known = {one.name: one for one in fields(kind)}
+    known = {field.name: field for field in fields(kind)}
     if not isinstance(values, dict) or not values.keys() <= known.keys():
         raise InputError(f"{origin}: it must be a table of {', '.join(known)}.")
     for name, value in values.items():
@@ -167,7 +168,7 @@ def _made(kind: type[Any], values: Any, origin: str) -> Any:
             raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number.")
         if abs(value) > LARGEST:
             raise InputError(f"{origin}: '{name}' is {value!r}; it must be at most {LARGEST:g}.")
-    missing = [name for name, one in known.items() if one.default is MISSING and name not in values]
+    missing = [name for name, field in known.items() if field.default is MISSING and name not in values]
     if missing:
         raise InputError(f"{origin}: it lacks {', '.join(missing)}.")
     return kind(**values)

@@ -18,13 +18,13 @@ LEAST, WHOLE = 0.01, 0.04
 LOADED = 0.05
 """Part of the peak force from which a sole presses."""
 PART = 1 / 3
-"""Of a contact, in which a sole lands; and as much in which it leaves."""
+"""Part of a contact in which a sole lands, and in which it lifts."""
 BREADTH = 0.16
 """Half the breadth of a mark over the length of the print."""
 SCRATCH, RAMP, HEAP = 0.12, 0.45, 0.2
-"""Heights over the depth of the print: of scratches, of what is missing from the wall ahead, of what lies before it."""
+"""Heights over the depth of the print: of scratches, of the gap in the wall ahead, of the heap before it."""
 FINE, LONG = 7.0, 12.0
-"""Breadth of scratches [mm], and how many times longer they are."""
+"""Breadth of scratches [mm], and their length over it."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Drag:
     Attributes
     ----------
     start, way : (2,) float arrays
-        Where the pressure was as it began, and how far the sole slid [m].
+        Middle of the pressure at its begin, and displacement of the sole [m].
     radius : float
         Half its breadth [m].
     depth : float
         Of the print [m].
     is_last : bool
-        Whether the sole left with it, and wiped its tread out; where it landed, it stood still on it afterwards.
+        True if the sole lifted with it, and wiped its tread out; after a landing, it stood still on it.
     """
 
     start: Array
@@ -51,21 +51,21 @@ class Drag:
 
     @property
     def length(self) -> float:
-        """Of the way [m]."""
+        """Length of the way [m]."""
         return float(np.hypot(*self.way))
 
     @property
     def share(self) -> float:
-        """How much of a whole mark it is, from 0 to 1."""
+        """Share of a whole mark, from 0 to 1."""
         return float(rise(np.asarray((self.length - LEAST) / (WHOLE - LEAST))))
 
-    def kept(self, around: Around) -> Array:
+    def spared(self, around: Around) -> Array:
         """Part of a tread that it leaves."""
         along, across = self._places(around)
         return np.asarray(1.0 - self.is_last * self.share * self._within(along, across))
 
     def _places(self, around: Around) -> tuple[Array, Array]:
-        """How far along the way and to its left places are [m]."""
+        """Distances of places along the way and to its left [m]."""
         x, y = around.x - self.start[0], around.y - self.start[1]
         cos, sin = self.way / self.length
         return x * cos + y * sin, y * cos - x * sin
@@ -90,7 +90,7 @@ class Drag:
 
 
 def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
-    """The marks of a footprint that slid as it landed or left; none of one that did not, or whose poses are not known.
+    """The marks of a footprint that slid as it landed or lifted; none if it did not, or its poses are not known.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
     count = int(PART * len(pressing))
     if not count:
         return []
-    found = []
+    drags = []
     for part, patch in ((pressing[:count], 0), (pressing[-count - 1 : -1], -1)):
         poses, centre = steps.poses[:, patch], steps.centres[part]
         local = np.linalg.solve(poses[part, :3, :3], (centre - poses[part, :3, 3])[..., None])
@@ -114,6 +114,6 @@ def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
         way = moved[:, :2].sum(axis=0)
         slid, radius = float(np.hypot(*way)), BREADTH * length
         if slid > LEAST:
-            behind = way / slid * radius if patch == 0 else 0.0  # what lands goes on to cover what it slid over
-            found.append(Drag(centre[0, :2] - behind, way, radius, depth, patch != 0))
-    return found
+            behind = way / slid * radius if patch == 0 else 0.0  # a landing sole covers the way that it slid
+            drags.append(Drag(centre[0, :2] - behind, way, radius, depth, patch != 0))
+    return drags

@@ -18,7 +18,7 @@ DEVIATION = 0.65
 """Standard deviation of the noise: most of it is within one amplitude."""
 
 ALONG_AN_AXIS = 181 / 231
-"""Part of the variance of a lattice that is left between its values, for each axis: the mean of (1 - p)² + p² over the
+"""Part of the variance of a lattice that remains between its values, for each axis: the mean of (1 - p)² + p² over the
 `_passage` p."""
 
 
@@ -48,7 +48,7 @@ def uniform(seed: int, *lattice: NDArray[np.int64]) -> Array:
 
 
 def rise(share: Array) -> Array:
-    """From 0 at 0 to 1 at 1, level at both ends and outside."""
+    """Smooth step from 0 at 0 to 1 at 1, level at both ends and outside."""
     part = np.clip(share, 0.0, 1.0)
     return np.asarray(part * part * (3.0 - 2.0 * part))
 
@@ -93,7 +93,7 @@ def noise(seed: int, size: float, *place: Array) -> Array:
 
 
 def _values(seed: int, cells: list[NDArray[np.int64]]) -> Callable[[list[NDArray[np.int64]]], Array]:
-    """What looks up values of a lattice, from -1 to 1: in a box around some cells if it is small, else each hashed."""
+    """Look-up of a lattice's values, from -1 to 1: in a box around the cells if it is small, else each hashed."""
     low = [int(axis.min(initial=0)) for axis in cells]
     size = [int(axis.max(initial=0)) + 2 - first for axis, first in zip(cells, low, strict=True)]
     if np.prod(size, dtype=float) > 8 * len(cells[0]):

@@ -1,4 +1,4 @@
-"""What a print's relief is made of: each layer adds heights, from a few amounts that a ground is known by.
+"""Layers of a print's relief: each adds heights, from a few amounts that are typical of a ground.
 
 Lengths of a layer are millimetres. A layer with no amounts is off.
 """
@@ -34,7 +34,7 @@ class Around:
     pressed : array
         From 0 outside the broken wall to 1 inside.
     finest : float
-        Least size of what the ground shows [m].
+        Least size that the ground shows [m].
     fineness : float
         See `PrintShape`.
     """
@@ -59,7 +59,7 @@ class Around:
         return noise(self.seed + number, scale, self.x, self.y) if scale >= self.finest else np.zeros(len(self.x))
 
     def near(self, width: float) -> Array:
-        """From 1 at the outline down to 0, about as e^(-|d| / width) [mm]."""
+        """Nearness from 1 at the outline down to 0, about e^(-|d| / width) [mm]."""
         part = np.maximum(1.0 - np.abs(self.inward) / (4.0 * self.length(width)), 0.0)
         return np.asarray(part**3)
 
@@ -129,7 +129,7 @@ class Floor:
 
 @dataclass(frozen=True)
 class Apron:
-    """What has crumbled off the wall, `at` a distance inside the outline and some `spread` around it, in `patches`."""
+    """Crumbs off the wall, `at` a distance inside the outline and some `spread` around it, in `patches`."""
 
     at: float
     spread: float
@@ -139,8 +139,8 @@ class Apron:
     def heights(self, around: Around) -> Array:
         """Heights [m]."""
         rough = 0.7 + 0.35 * around.noise(131, 7.0) + 0.2 * around.noise(132, 3.5)
-        there = around.at(self.at, self.spread) * around.patches(133, self.patches)
-        return there * np.maximum(rough, 0.0) * around.length(self.height)
+        cover = around.at(self.at, self.spread) * around.patches(133, self.patches)
+        return cover * np.maximum(rough, 0.0) * around.length(self.height)
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Streaks:
 
 @dataclass(frozen=True)
 class Fans:
-    """What has slid down the wall and lies at its foot as fans of a `width`, out to a `reach` inside the outline."""
+    """Slides off the wall, at its foot as fans of a `width`, out to a `reach` inside the outline."""
 
     width: float
     reach: float
@@ -178,7 +178,7 @@ class Fans:
 
 @dataclass(frozen=True)
 class Lip:
-    """A lip that the sole has drawn up as it left, along a `share` of the outline."""
+    """A lip that the lifting sole has drawn up, along a `share` of the outline."""
 
     at: float
     spread: float
@@ -222,7 +222,7 @@ class Cracks:
         return (self._plates(around, plates) - open_ * around.length(self.depth)) * zone
 
     def _plates(self, around: Around, plates: Cells) -> Array:
-        """How high each plate lies [m]."""
+        """Height of each plate [m]."""
         lift, along, across = (uniform(seed, plates.number.astype(np.int64)) for seed in (1, 2, 3))
         slope = (2.0 * along - 1.0) * plates.x + (2.0 * across - 1.0) * plates.y
         return self.tilt * slope + around.length(self.lowest) + lift * around.length(self.highest - self.lowest)
@@ -253,17 +253,17 @@ class Fissures:
 
 
 LONG = 20.0
-"""How many times longer than their spacing fissures would run."""
+"""Length that fissures would run, over their spacing."""
 
 _BENT = ((0, 16.0, 6.0), (1, 5.0, 1.8))
-"""How the borders of plates are bent: number, size and amount of noise [mm]."""
+"""Noise that bends the borders of plates: number, size and amount [mm]."""
 
 
 @dataclass(frozen=True)
 class Crumbs:
     """Crumbs about the outline, out to about a `width` from it, fewer inside: see `ScatteredCrumbs`.
 
-    `share` is how full of the largest the ground is on the outline (see `scattered`), `within` the part of it inside.
+    `share` is the density of the largest on the outline (see `scattered`), `within` the part of it inside.
     """
 
     share: float

@@ -26,19 +26,19 @@ NEARLY = 0.8
 FINEST_CRUMB = 1.5
 """Least diameter of crumbs that are shown, over the finest size."""
 FULL = 0.9
-"""How far ground is pressed where water may stand: within the walls."""
+"""Share of pressing from which on water may stand: within the walls."""
 MEAN_TREAD = 0.3
 """Part of a tread that is grooves, about."""
 FLESH, ARCH = 0.7, 0.018
-"""Height of what a bare foot leaves standing over the depth of its print, and the most of it [m]: its arch comes down
-into deep prints as well."""
+"""Height of a bare foot's ridges over the depth of its print, and the most of it [m]: its arch comes down into deep
+prints as well."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
 
 
 @dataclass(frozen=True)
 class Relief:
-    """What relief does at places, all (N,) arrays [m].
+    """Effect of relief at places, all (N,) arrays [m].
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Relief:
     water : array
         Depth of the water that stands on it.
     pressed : array
-        From 0 to 1: how far the print wipes out what earlier ones left there.
+        Share of earlier prints' relief that this one wipes out, from 0 to 1.
     """
 
     height: Array
@@ -66,7 +66,7 @@ class PrintRelief:
     seed : int
         The print's own.
     finest : float
-        Least size of what the ground shows [m].
+        Least size that the ground shows [m].
     tread : SoleTread, optional
         That the sole has; nothing of it is shown where its grooves are too narrow for that.
     tread_strength : float
@@ -107,20 +107,20 @@ class PrintRelief:
 
     @property
     def has_tread(self) -> bool:
-        """Whether a tread is in it."""
+        """True if it includes a tread."""
         return self._tread is not None and self._amounts.tread is not None
 
     def at(self, x: Array, y: Array) -> Relief:
         """The relief at world places (N,)."""
         moves = np.flatnonzero(self._shape.moves(x, y))
-        there = self._relief(self._look_up(x[moves], y[moves]))
+        moved = self._relief(self._look_up(x[moves], y[moves]))
         whole = np.zeros((4, len(x)))
-        whole[:, moves] = there.height, there.compression, there.water, there.pressed
+        whole[:, moves] = moved.height, moved.compression, moved.water, moved.pressed
         return Relief(*whole)
 
     def _balance(self, places: _Places) -> float:
-        """How much deeper the print has to be for its volume to stay, over its depth; layers that ask for more than
-        `MOST_VOLUME` are lowered: no print throws up more than it has pressed."""
+        """Deepening that keeps the print's volume, over its depth; layers that ask for more than `MOST_VOLUME` are
+        lowered: no print throws up more than it has pressed."""
         whole = self._relief(places)
         weight = max(float((places.fade * whole.pressed * places.floor).sum()), 1e-12)
         asked = float(whole.height.sum()) / weight
@@ -132,7 +132,7 @@ class PrintRelief:
         return float(np.clip(asked, -MOST_VOLUME, MOST_VOLUME))
 
     def _widening(self, places: _Places) -> float:
-        """How much further out the wall has to be for the print to keep its volume [m]; 0 where it is kept as it is."""
+        """Shift of the wall outward that keeps the print's volume [m]; 0 without a wall of its own."""
         if not self._amounts.wall:
             return 0.0
         step = 0.5 * self._shape.cell_size
@@ -185,7 +185,7 @@ class PrintRelief:
         )  # fmt: skip
 
     def _chunks(self, chunks: Chunks, x: Array, y: Array) -> Array:
-        """How much further inside the outline places are than they were, for pieces of the edge that broke [m]."""
+        """Shift of places inward from the outline, by pieces of the edge that broke [m]."""
         size = chunks.size * MM * self._shape.fineness
         pieces = cells(self._seed + 31, size, x, y)
         middle = self._shape.at(x - pieces.x, y - pieces.y)[0]
@@ -195,7 +195,7 @@ class PrintRelief:
         return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, number) < chunks.share), shift, 0.0)
 
     def _rebuilt(self, places: _Places, wider: float) -> tuple[Array, Array, Array]:
-        """Change of height and compression by the broken wall, and what is pressed, with the wall so much wider [m]."""
+        """Change of height and compression by the broken wall, and share of pressing; the wall is `wider` [m]."""
         wall = self._amounts.wall * MM * self._shape.fineness
         if wall:
             pressed = rise((places.inward + wider) / wall + 0.5)
@@ -208,7 +208,7 @@ class PrintRelief:
         return (rim - places.rim) * places.fade - deeper, deeper, pressed
 
     def _ledges(self, places: _Places, depth: Array) -> Array:
-        """How much further inside places of the wall are, which lie at some depth [m]: walls are no prisms."""
+        """Shift of the wall's places inward at their depth [m]: walls are no prisms."""
         further = np.zeros(len(depth))
         on_wall = np.flatnonzero(np.abs(places.inward) < 2.0 * self._amounts.wall * MM)
         at = (places.x[on_wall], places.y[on_wall], depth[on_wall])
@@ -240,7 +240,7 @@ class PrintRelief:
         return float(np.percentile(heights, 50.0 * water.share) + water.above * MM * self._shape.fineness)
 
     def _standing(self, places: _Places, around: Around) -> Array:
-        """What the tread leaves standing in the print [m]."""
+        """Ridges of the tread in the print [m]."""
         tread, shape = self._amounts.tread, self._shape
         if tread is None or self._tread is None:
             return np.zeros(len(places.x))
@@ -254,7 +254,7 @@ class PrintRelief:
         )
         ridges = self._tread(under) - MEAN_TREAD
         for drag in self._drags:
-            ridges = ridges * drag.kept(around)
+            ridges = ridges * drag.spared(around)
         if self._tread.is_flesh:
             height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.kept)
             return ridges * around.pressed * height * min(1.0, self._tread_strength)
@@ -266,7 +266,7 @@ class PrintRelief:
 
 @dataclass(frozen=True)
 class _Places:
-    """Places around a print and what is there, all (N,) arrays: see `Around` and `PrintShape`."""
+    """Places around a print and their values, all (N,) arrays: see `Around` and `PrintShape`."""
 
     x: Array
     y: Array

@@ -1,4 +1,4 @@
-"""The shape of one print: how far from its outline each place lies, and how deep it is without its wall."""
+"""The shape of one print: distance of each place from its outline, and its depth without its wall."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
-from ..ground.heightfield import Window
+from ..ground.sparse_grid import Window
 from ..numerics import bilinear
 from ..record.footprints import Footprint
 
@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 REACH = 0.06
-"""How far from its outline a print's relief goes [m]."""
+"""Distance from its outline up to which a print has relief [m]."""
 MOST_CELLS = 64
 """Cells that the distance to an outline is known for at most: ground of smaller cells carries small feet."""
 CORE = 0.008
@@ -37,9 +37,9 @@ LEVEL = 0.995
 """Length of a sole seen from above, in parts of the greatest, from which it lies flat."""
 
 _FADE = 5
-"""Number among `PrintShape.fields` of how near the end of the ground that moves a cell is."""
+"""Index in `PrintShape.fields` of the nearness to the end of the moved ground."""
 MOVED = 1e-5
-"""Ground that moves less has no relief [m]; and none beside such cells: what has relief moves anyway."""
+"""Ground that moves less, or lies beside such cells, has no relief [m]."""
 FADING = 0.012
 """Width over which relief ends where the print no longer moves the ground [m]."""
 
@@ -55,19 +55,19 @@ class PrintShape:
         Side of a cell [m].
     fields : (8, rows, columns) float array
         Distance to the outline, positive inside, up to `REACH`; depth of the floor, continued beyond the outline;
-        displayed compression and rim; and the rim continued into the print, all [m]; how near the end of the ground
-        that the print moves a cell is, from 0 at that end to 1; and the direction inward, along x and y.
+        displayed compression and rim; and the rim continued into the print, all [m]; a fade, from 0 at the end of the
+        ground that the print moves to 1; and the direction inward, along x and y.
     depth : float
         Mean depth of the floor [m].
     fineness : float
-        How much smaller than usual lengths are, as the print is small: 1 or less.
+        Scale of lengths, 1 or less for small prints.
     position : (2,) float array
         Middle of the pressure [m].
     heading : (2,) float array
         Direction of the toes.
     along, across : (float, float)
-        Where heel and toes of the sole end along it, and where its right and left side do, from the middle of the
-        pressure [m]; of the print where the sole is not known.
+        Ends of the sole along it, heel and toes, and across, right and left, from the middle of the pressure [m]; those
+        of the print where the sole is not known.
     """
 
     window: Window
@@ -85,7 +85,7 @@ class PrintShape:
         return self._between(self.fields, x, y)
 
     def moves(self, x: Array, y: Array) -> Mask:
-        """At which of world places (N,) the print moves the ground."""
+        """True for world places (N,) at which the print moves the ground."""
         return np.asarray(self._between(self.fields[_FADE, None], x, y)[0] > 0)
 
     def moved(self, spacing: float) -> tuple[Array, Array]:
@@ -95,7 +95,7 @@ class PrintShape:
         x, y = (
             places.ravel()
             for places in np.meshgrid(
-                *((one[:, None] + between).ravel() for one in self.window.centres(self.cell_size))
+                *((centre[:, None] + between).ravel() for centre in self.window.centres(self.cell_size))
             )
         )
         moves = self.moves(x, y)
@@ -104,15 +104,15 @@ class PrintShape:
     def _between(self, fields: Array, x: Array, y: Array) -> Array:
         column = np.clip(x / self.cell_size - 0.5 - self.window.column, 0.0, self.window.columns - 1.001)
         row = np.clip(y / self.cell_size - 0.5 - self.window.row, 0.0, self.window.rows - 1.001)
-        left, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
-        corner = low * self.window.columns + left
+        first, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
+        corner = low * self.window.columns + first
         flat = fields.reshape(len(fields), -1)
         above = corner + self.window.columns
         around = (flat[:, at] for at in (corner, corner + 1, above, above + 1))
-        return np.asarray(bilinear.between(around, np.asarray(column - left), np.asarray(row - low)))
+        return np.asarray(bilinear.between(around, np.asarray(column - first), np.asarray(row - low)))
 
     def under_sole(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """How far along the foot and to its left places lie from the middle of the pressure [m]."""
+        """Distances of places along the foot and to its left from the middle of the pressure [m]."""
         dx, dy = x - self.position[0], y - self.position[1]
         cos, sin = self.heading
         return dx * cos + dy * sin, dy * cos - dx * sin
@@ -194,7 +194,7 @@ def _ends(
 
 
 def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
-    """Distance to the nearest chosen cell's centre, up to `far`, and which that is [cells].
+    """Distance to the nearest chosen cell's centre [cells], up to `far`, and the index of that cell.
 
     Exact by one direction after the other (Felzenszwalb and Huttenlocher 2012, doi:10.4086/toc.2012.v008a019), with
     the minimum over all columns within reach in place of the envelope of parabolas.
@@ -213,13 +213,13 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     high = np.minimum(np.abs(source - row), far + 1).astype(np.float64) ** 2
     best = high.copy()
     which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
-    own = which.copy()
+    in_column = which.copy()
     for shift in range(1, min(far, columns - 1) + 1):
-        for here, there in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
-            distance = high[:, there] + shift * shift
-            closer = distance < best[:, here]
-            best[:, here] = np.where(closer, distance, best[:, here])
-            which[:, here] = np.where(closer, own[:, there], which[:, here])
+        for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
+            distance = high[:, beside] + shift * shift
+            closer = distance < best[:, to]
+            best[:, to] = np.where(closer, distance, best[:, to])
+            which[:, to] = np.where(closer, in_column[:, beside], which[:, to])
     return np.minimum(np.sqrt(best), float(far)), which
 
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground import crumbs
+from ..ground import crumbs, surfaces
 from .lattice_noise import hashed, uniform
 from .layers import Around
 
 Array = NDArray[np.float64]
 
 SUNK = 0.7
-"""How far the middle of a crumb is below the ground at most, over its radius."""
+"""Largest depth of a crumb's middle below the ground, over its radius."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class ScatteredCrumbs:
     corner : (int, int)
         Column and row of the first square.
     crowns : Crowns
-        What they look like from above.
+        Their shapes from above.
     x, y, radius : (rows, columns) float arrays
         Of the crumb in each square [m]; the radius is 0 where there is none.
     sunk : (rows, columns) float array
-        How far its middle is below the ground, over its radius.
+        Depth of its middle below the ground, over its radius.
     turn : (rows, columns) float array
         About the vertical [rad].
     shape : (rows, columns) int array
@@ -92,13 +92,12 @@ def scattered(
     Parameters
     ----------
     surface : str
-        See `core.ground.presets.SURFACES`.
     seed : int
         The print's own.
     low, high : (2,) float arrays
         Corners of the rectangle [m].
     chance : callable
-        How full of crumbs the ground is at places x, y (N,) [m], from 0 to 1.
+        Density of crumbs at places x, y (N,) [m], from 0 to 1.
     share : float
         Of the largest, for each square of their lattice, where it is 1.
     smallest : float
@@ -106,12 +105,12 @@ def scattered(
     fineness : float
         See `PrintShape`.
     """
-    crowns, found = crumbs.crowns(surface), []
-    for number, (size, full) in enumerate(crumbs.octaves(crumbs.LARGEST[surface] * fineness, smallest)):
+    crowns, largest, layered = crumbs.crowns(surface), surfaces.find(surface).fragments.largest, []
+    for number, (size, full) in enumerate(crumbs.octaves(largest * fineness, smallest)):
         layers = max(1, int(np.ceil(share * full)))  # of what is fuller than full
         for layer in range(layers):
-            found.append(_layer(crowns, seed + 10 * number + layer, size, (low, high), share * full / layers, chance))
-    return found
+            layered.append(_layer(crowns, seed + 10 * number + layer, size, (low, high), share * full / layers, chance))
+    return layered
 
 
 def _layer(
@@ -129,8 +128,8 @@ def _layer(
     luck = [uniform(kind, value.astype(np.int64)) for kind in range(5)]
     x = (column + (value & np.uint32(0xFFFF)) * 2.0**-16) * side
     y = (row + (value >> np.uint32(16)) * 2.0**-16) * side
-    there = luck[0] < full * chance(x.ravel(), y.ravel()).reshape(x.shape)
-    radius = np.where(there, crumbs.diameters((size / 2.0, size), luck[1]) / 2.0, 0.0)
+    present = luck[0] < full * chance(x.ravel(), y.ravel()).reshape(x.shape)
+    radius = np.where(present, crumbs.diameters((size / 2.0, size), luck[1]) / 2.0, 0.0)
     shape = (luck[4] * len(crowns.heights)).astype(np.intp)
     corner = (int(column[0, 0]), int(row[0, 0]))
     return ScatteredCrumbs(side, corner, crowns, x, y, radius, SUNK * luck[2], 2 * np.pi * luck[3], shape)

@@ -1,4 +1,4 @@
-"""The relief of all steps at the places of a ground: what each step adds, and what it wipes out of those before."""
+"""The relief of all steps at the places of a ground: each adds its own and wipes out that of earlier ones."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ QUANTUM = 2.0**-20
 
 @dataclass(frozen=True)
 class StepRelief:
-    """What the relief of one step adds to the ground while the step presses it.
+    """Relief that one step adds to the ground while it presses.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class StepRelief:
     water : (N,) float array
         Depth of the water that stands there after the step [m].
     tread : bool
-        Whether the tread of the sole is in it.
+        True if it includes the tread of the sole.
     """
 
     point: Indices
@@ -48,18 +48,18 @@ class StepRelief:
 
 
 NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
-"""Of a step that has none."""
+"""Relief of a step that has none."""
 
 
 @dataclass(frozen=True)
 class ReliefSettings:
-    """What relief a ground shows.
+    """Settings of the relief that a ground shows.
 
     Attributes
     ----------
     amounts : Amounts
     strength : float
-        Of all of it: 1 is as the amounts say.
+        Factor of all of it: 1 for the amounts as given.
     treads : mapping of (str, str) to SoleTread
         Of the soles that have one, by character and name.
     tread_strength : float
@@ -76,9 +76,9 @@ class ReliefSettings:
 def relief_of_steps(
     footprints: Sequence[Footprint], x: Array, y: Array, wanted: ReliefSettings, *, blur_sigma: float
 ) -> Slices[list[StepRelief]]:
-    """What each step adds to the displayed ground at places (K,), in the order of the footprints.
+    """Relief that each step adds to the displayed ground at places (K,), in the order of the footprints.
 
-    A step presses flat what earlier ones left under it: it takes their relief away where it presses, as it comes.
+    A step flattens the relief of earlier ones where it presses, as it comes.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _step(
     wanted: ReliefSettings,
     blur_sigma: float,
 ) -> StepRelief:
-    """What a step adds to the relief at all places (K, 2), which is brought up to date, as the water (K,) is."""
+    """Relief that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
     point = places.within(footprint.window.expanded(margin), footprint.cell_size) if len(places.x) else NOTHING.point
     if not len(point):
@@ -130,12 +130,12 @@ def _step(
     change = np.round(change / QUANTUM) * QUANTUM
     standing[point] += change
     water[point] = np.maximum(water[point] * (1.0 - relief.pressed), relief.water)
-    some = change.any(axis=1)
-    return StepRelief(point[some], change[some], water[point[some]], of_print.has_tread)
+    changed = change.any(axis=1)
+    return StepRelief(point[changed], change[changed], water[point[changed]], of_print.has_tread)
 
 
 def _finest(places: Places, point: Indices, cell_size: float) -> float:
-    """Distance between places around a print [m], as a whole part of a cell: what is finer cannot be shown there."""
+    """Distance between places around a print [m], as a whole part of a cell: finer detail cannot be shown there."""
     column, row = np.floor(places.x[point] / cell_size), np.floor(places.y[point] / cell_size)
     cells = len(np.unique(column + 1j * row))
     return float(cell_size / max(1.0, np.round(np.sqrt(len(point) / cells))))

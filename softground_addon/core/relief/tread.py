@@ -1,4 +1,4 @@
-"""Tread of soles as heights: what the grooves of a sole leave standing in the ground.
+"""Tread of soles as heights: ridges that the grooves of a sole leave in the ground.
 
 Patterns are those of right feet.
 """
@@ -41,7 +41,7 @@ class Under:
 
 
 Pattern = Callable[[Under], Array]
-"""Height of the ground under a sole (N,), from 0 under what presses to 1 in the grooves of shoes."""
+"""Height of the ground under a sole (N,), from 0 under pressing parts to 1 in the grooves of shoes."""
 
 
 GROOVE = 0.0044
@@ -103,11 +103,11 @@ def bare(under: Under) -> Array:
 
 
 PATTERNS: Mapping[str, Pattern] = {"HIKING": hiking, "TRAINER": trainer, "BARE": bare}
-"""Those that are drawn by formulas."""
+"""Patterns that are drawn by formulas."""
 
 
 def of_map(of_sole: Array) -> Pattern:
-    """The pattern of a sole by how far it stands out; see `tread_map`."""
+    """The pattern of a sole from a map of its heights; see `tread_map`."""
 
     def mapped(under: Under) -> Array:
         return 1.0 - height_at(of_sole, 0.5 + under.along / LENGTH, 0.5 - under.across / under.breadth)
@@ -123,7 +123,7 @@ class SoleTread:
     ----------
     pattern : Pattern
     is_mirrored : bool
-        As it is for left feet.
+        True for left feet.
     """
 
     pattern: Pattern
@@ -131,7 +131,7 @@ class SoleTread:
 
     @property
     def is_flesh(self) -> bool:
-        """Whether it is that of a bare foot: what it leaves standing is high and goes on into the wall."""
+        """True if it is that of a bare foot: its ridges are high and go on into the wall."""
         return self.pattern is bare
 
     def __call__(self, under: Under) -> Array:

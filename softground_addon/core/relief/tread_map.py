@@ -1,4 +1,4 @@
-"""Soles as maps: how far each spot of a sole stands out, from an image or from a mesh, and as text for the record."""
+"""Soles as maps of the height of each spot, from an image or from a mesh, and as text for the record."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ALONG, ACROSS = 192, 72
 """Spots of a map from heel to toes, and from the left side to the right: 1.4 mm apart on a foot of 27 cm."""
 
 WIDEST_GROOVE = 0.06
-"""Width of the widest grooves over the length of a sole; what is wider is its shape."""
+"""Width of the widest grooves over the length of a sole; wider ones are its shape."""
 DEEPEST = 98
 """Percentile of the grooves' heights that counts as the deepest."""
 FLAT = 0.002
@@ -28,8 +28,8 @@ FLAT = 0.002
 def from_picture(values: Array) -> Map:
     """A map from brightness (rows, columns), the first row at the bottom.
 
-    The long side is from heel to toes: at the top, or at the right of a picture that is wider than high. What is white
-    stands out and presses, what is black is a groove.
+    The long side is from heel to toes: at the top, or at the right of a picture that is wider than high. White stands
+    out and presses, black is a groove.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def _in_parts(upright: Array) -> Map:
 
 
 def _shares(count: int, size: int) -> Array:
-    """How much each of so many pixels is of each part of a row of them, (count, size)."""
+    """Share of each of `size` pixels in each of `count` parts of a row, (count, size)."""
     ends = np.linspace(0.0, size, count + 1)
     low, high = np.maximum(ends[:-1, None], np.arange(size)), np.minimum(ends[1:, None], np.arange(size) + 1)
     return np.asarray(np.maximum(high - low, 0.0) * (count / size))
@@ -65,8 +65,8 @@ def from_underside(heights: Array, length: float) -> Map | None:
     Returns
     -------
     (ALONG, ACROSS) uint8 array or None
-        Grooves are what rises above the opening of the heights: what is narrower than `WIDEST_GROOVE` (top-hat
-        transform, Serra 1982, Image Analysis and Mathematical Morphology, ch. XII).
+        Grooves rise above the opening of the heights: they are narrower than `WIDEST_GROOVE` (top-hat transform, Serra
+        1982, Image Analysis and Mathematical Morphology, ch. XII).
     """
     inside = np.isfinite(heights)
     far = max(1, round(0.5 * WIDEST_GROOVE * len(heights)))
@@ -86,7 +86,7 @@ def from_underside(heights: Array, length: float) -> Map | None:
 def _lowest(heights: Array, far: int) -> Array:
     """The lowest height within so many nodes, along both axes."""
     for axis in (0, 1):
-        wide = np.pad(heights, [(far, far) if one == axis else (0, 0) for one in (0, 1)], constant_values=np.inf)
+        wide = np.pad(heights, [(far, far) if each == axis else (0, 0) for each in (0, 1)], constant_values=np.inf)
         heights = np.lib.stride_tricks.sliding_window_view(wide, 2 * far + 1, axis).min(axis=-1)
     return heights
 
@@ -112,7 +112,7 @@ def from_text(text: str) -> Array:
 
 
 def height_at(of_sole: Array, along: Array, across: Array) -> Array:
-    """How far a sole stands out (N,), from 0 to 1.
+    """Height by which a sole stands out (N,), from 0 to 1.
 
     Parameters
     ----------
@@ -123,6 +123,6 @@ def height_at(of_sole: Array, along: Array, across: Array) -> Array:
     row, column = (
         np.clip(place * count - 0.5, 0.0, count - 1.001) for place, count in ((along, ALONG), (across, ACROSS))
     )
-    low, left = row.astype(np.intp), column.astype(np.intp)
-    corners = (of_sole[low, left], of_sole[low, left + 1], of_sole[low + 1, left], of_sole[low + 1, left + 1])
-    return np.asarray(bilinear.between(corners, np.asarray(column - left), np.asarray(row - low)))
+    low, first = row.astype(np.intp), column.astype(np.intp)
+    corners = (of_sole[low, first], of_sole[low, first + 1], of_sole[low + 1, first], of_sole[low + 1, first + 1])
+    return np.asarray(bilinear.between(corners, np.asarray(column - first), np.asarray(row - low)))

@@ -1,1 +1,1 @@
-"""What the pressed ground does to the character: tilt, sinking feet, legs."""
+"""Response of the character to the pressed ground: tilt, sinking feet, legs."""

@@ -3,37 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
+from ..legs.foot_lock import lock, moved, slides, travelling, underside_on
+from ..legs.foot_placement import Placement, place_sole
+from ..legs.grounding import Response, has_ankle, leg_of, leg_soles, stand, with_sole
+from ..legs.sole_rim import posed_rim
+from ..loads.contacts import REST_SPEED
 from ..motion.motion import CharacterMotion
+from ..numerics.intervals import runs
 from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
-from .foot_lock import lock, moved, slides, travelling, underside_on
-from .foot_placement import Placement, place_sole
-from .grounding import HIPS_TIME, Response, has_ankle, hips_go_along, leg_of, leg_soles, settle, with_sole
-from .sole_rim import posed_rim
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
-ONE_PIECE_PASSES = 16
+ONE_PIECE_PASSES = 128
 """Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
-stand on other points."""
+stand on other points. Those count that move least, as knees that reach their pace may give way otherwise."""
 IN_PLACE = 1e-4
 """Feet that move less than this from one time to the next are where they belong, in leg lengths."""
 
 
+RESTING = 0.5
+"""Toes rest that are slower than this part of the body that goes on over them."""
+RESTING_TIME = 0.1
+"""Toes that rest no longer than this before or after a contact are landing or leaving [s], for an adult."""
+HEEL_UP = 0.05
+"""Toes rest while the heel is higher than they by more than this, in sole lengths."""
+RESTING_HEIGHT = 0.1
+"""Toes rest no higher above where the foot stands, in leg lengths: in captures, bodies bounce with their feet."""
+
+
 @dataclass(frozen=True)
 class FootFaults:
-    """What a character's feet do on a hard floor while they stand that feet do not.
+    """Faults of a character's feet that stand on a hard floor: slide, float, penetration.
 
     Attributes
     ----------
@@ -51,9 +63,38 @@ class FootFaults:
     frames: Array
 
 
+def resting(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Mask:
+    """Contacts (F, S), with the time in which toes rest while the foot floats higher than feet do that touch.
+
+    Where a network has made the motion, it takes feet off the floor as their heels rise. The body goes on over them.
+    """
+    window = max(1, round(RESTING_TIME / 2 * motion.adult_second))
+    body = _level_speed(motion.hips, window)
+    goes_on, rests = body > REST_SPEED * motion.froude_speed * motion.time_step, touching.copy()
+    for number in leg_soles(motion).values():
+        points, touches = motion.soles[number].landmark_positions(), touching[:, number]
+        height = points[..., 2] - terrain.heights(points[..., 0], points[..., 1])
+        lowest = np.where(np.isfinite(height), height, np.inf).min(axis=1)
+        low = lowest < np.median(lowest[touches]) + RESTING_HEIGHT * motion.leg_length if touches.any() else touches
+        toes_slow = _level_speed(points[:, -1], window) < RESTING * body
+        heel_up = height[:, 0] - height[:, -1] > HEEL_UP * motion.soles[number].sole.length
+        still = touches | (low & goes_on & toes_slow & heel_up)
+        for first, end in zip(*runs(still), strict=True):
+            for start, stop in zip(*runs(~touches[first:end]), strict=True):
+                rests[first + start : first + stop, number] = 2 * window < stop - start < end - first
+    return rests
+
+
+def _level_speed(path: Array, window: int) -> Array:
+    """Level speed (F,) of a path (F, 3) [m per sample], from `window` samples before to as many after."""
+    now = np.arange(len(path))
+    before, after = np.maximum(now - window, 0), np.minimum(now + window, len(path) - 1)
+    return np.asarray(np.linalg.norm((path[after] - path[before])[:, :2], axis=1) / np.maximum(after - before, 1))
+
+
 @sliced
 def standing(motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: Sequence[FootHold] = ()) -> Slices[Mask]:
-    """When the legs' soles are to stand still, (F, S): while they touch and do not travel on purpose; see `clean`."""
+    """True while the legs' soles are to stand still, (F, S): they touch and do not travel on purpose; see `clean`."""
     floor, stands = GroundHistory(terrain), touching.copy()
     for number in leg_soles(motion).values():
         yield
@@ -71,7 +112,7 @@ def clean(
     holds: Sequence[FootHold] = (),
     stands: Mask | None = None,
 ) -> Slices[Response]:
-    """What makes the feet stand where their contacts say that they stand.
+    """Response that makes the feet stand still during their contacts.
 
     Parameters
     ----------
@@ -81,24 +122,27 @@ def clean(
     terrain : Terrain
         The floor.
     holds : sequence of FootHold
-        Contacts that are held in another way than by what bears.
+        Contacts that are held in another way than by their bearing points.
     stands : (F, S) bool array, optional
-        What `standing` tells of these, where it is known.
+        Result of `standing` for these, if known.
     """
     if stands is None:
         stands = yield from standing.slices(motion, touching, terrain, holds)
     response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, {})
     middles = {side: leg_of(motion, side, sole).ankle for side, sole in leg_soles(motion).items()}
     of_one_piece = [side for side in middles if not has_ankle(motion, side)]
+    settled, least = response, np.inf
     for _ in range(ONE_PIECE_PASSES if of_one_piece else 0):
         so_far = {side: response.legs[side].foot for side in of_one_piece}
         response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
         moves = [
             carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]) for side in so_far
         ]
-        if np.abs(moves).max() < IN_PLACE * motion.leg_length:
+        largest = float(np.abs(moves).max())
+        settled, least = (response, largest) if largest < least else (settled, least)
+        if largest < IN_PLACE * motion.leg_length:
             break
-    return response
+    return settled
 
 
 @sliced
@@ -113,7 +157,6 @@ def _cleaned(
     """See `clean`; feet start from where they are so far, (F, 4, 4) by side, or from the source."""
     floor, frames = GroundHistory(terrain), motion.frames
     placements: dict[str, tuple[int, Placement]] = {}
-    offsets = []
     for side, number in leg_soles(motion).items():
         source, touches = motion.soles[number], touching[:, number]
         start = so_far.get(side, np.eye(4))
@@ -139,35 +182,27 @@ def _cleaned(
             align=0.0,
             points=posed_rim(lying),
         )
-        ankle = leg_of(motion, side, number).ankle
-        lift = first.lift + placed.lift
-        if side in so_far:
-            lift = lift + (carried(start, ankle) - ankle)[:, 2]
-        carry, lift = contacts.faded(source, placed.carry @ locked @ start, lift)
-        placements[side] = number, Placement(carry, lift, np.zeros_like(lift), placed.room)
-        offsets.append((carried(carry, ankle) - ankle)[:, :2])
+        carry = contacts.faded(source, placed.carry @ locked @ start)
+        placements[side] = number, replace(placed, carry=carry)
     yield
-    soles = [number for number, _ in placements.values()]
-    level = hips_go_along(motion, soles, offsets, stands, HIPS_TIME)
-    upright = np.zeros((len(motion.frames), 2))
-    return (yield from settle.slices(motion, placements, touching, upright, level=level, source_pace=True))
+    return (yield from stand.slices(motion, placements, touching, stands))
 
 
 def missed_holds(motion: CharacterMotion, touching: Mask, holds: Sequence[FootHold]) -> tuple[FootHold, ...]:
-    """Those of some holds that hold nothing: no leg stands on such a foot, or it does not touch in that frame."""
+    """Holds without effect: no leg stands on such a foot, or it does not touch in that frame."""
     feet = {motion.soles[number].sole.name: touching[:, number] for number in leg_soles(motion).values()}
-    found = [hold for hold in holds if hold.foot not in feet]
+    missed = [hold for hold in holds if hold.foot not in feet]
     for foot, touches in feet.items():
-        found += HeldContacts.of(holds, foot, motion.frames, touches).missed
-    return tuple(found)
+        missed += HeldContacts.of(holds, foot, motion.frames, touches).missed
+    return tuple(missed)
 
 
 @sliced
 def foot_faults(
     motion: CharacterMotion, touching: Mask, terrain: Terrain, stands: Mask | None = None
 ) -> Slices[FootFaults]:
-    """How far the legs' soles float and sink while they touch (F, S), and slide while they stand (F, S), by default all
-    that time; by all points of their rims."""
+    """Distances that the legs' soles float and sink while they touch (F, S), and slide while they stand (F, S), by
+    default all that time; by all points of their rims."""
     floor = GroundHistory(terrain)
     slid, gaps, frames = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for number in leg_soles(motion).values():

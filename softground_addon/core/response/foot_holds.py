@@ -1,4 +1,4 @@
-"""How the artist wants single contacts to be held: by the heel, by the ball, flat, or not at all."""
+"""Contacts that the artist holds in another way: by the heel, by the ball, flat, or not at all."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import SoleMotion
+from ..legs.foot_lock import Underside
+from ..legs.foot_placement import PressedGround, between_contacts, posed_points
+from ..motion.sole_motion import SoleMotion
 from ..numerics.intervals import runs
 from ..numerics.orientation import rotation_vectors
 from ..numerics.plane_fit import fitted_slope
 from ..numerics.rigid import carried, displacement, rotation, turn_between
-from .foot_lock import Underside
-from .foot_placement import PressedGround, between_contacts, posed_points
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -26,7 +26,7 @@ MODES: tuple[HoldMode, ...] = get_args(HoldMode)
 
 @dataclass(frozen=True)
 class FootHold:
-    """How one contact of a foot is held.
+    """The way in which one contact of a foot is held.
 
     Attributes
     ----------
@@ -35,8 +35,8 @@ class FootHold:
     frame : float
         Any scene frame of the contact.
     mode : 'ROLL', 'HEEL', 'BALL', 'FLAT' or 'FULL'
-        What stays in its place: whatever bears, as the foot rolls over it; the heel or the ball; what bears of a foot
-        that lies flat all the time; or the whole foot, as it is where it moves slowest.
+        The part that stays in its place: the bearing points, as the foot rolls over them; the heel or the ball; the
+        bearing points of a foot that lies flat all the time; or the whole foot, as it is where it moves slowest.
     strength : float
         0 leaves the contact as it is in the source, 1 holds it.
     ease_in, ease_out : float
@@ -59,7 +59,7 @@ class HeldContacts:
     ----------
     touching : (F,) bool array
     contacts : tuple of (slice, FootHold)
-        Those that are held in another way than by what bears.
+        Contacts that are held in another way than by their bearing points.
     missed : tuple of FootHold
         Those in whose frame the foot does not touch.
     """
@@ -69,8 +69,8 @@ class HeldContacts:
     missed: tuple[FootHold, ...] = ()
 
     def standing(self, travels: Mask) -> Mask:
-        """When the foot is to stand still (F,): while it touches, but for when it travels (F,) in a contact that the
-        artist does not hold."""
+        """True while the foot is to stand still (F,): it touches, and does not travel (F,) in a contact that the artist
+        does not hold."""
         stands = self.touching & ~travels
         for during, _ in self.contacts:
             stands[during] = self.touching[during]
@@ -78,21 +78,21 @@ class HeldContacts:
 
     @staticmethod
     def of(holds: Sequence[FootHold], foot: str, frames: Array, touching: Mask) -> HeldContacts:
-        """Those of a foot that touches (F,) at scene frames (F,); of two for one contact, the later in the list."""
-        found: dict[int, tuple[slice, FootHold]] = {}
+        """Holds of a foot that touches (F,) at scene frames (F,); of two for one contact, the later in the list."""
+        by_contact: dict[int, tuple[slice, FootHold]] = {}
         missed: list[FootHold] = []
         starts, ends = runs(touching)
-        for hold in (one for one in holds if one.foot == foot):
+        for hold in (each for each in holds if each.foot == foot):
             at = int(np.abs(frames - hold.frame).argmin())
             if not touching[at] or abs(frames[at] - hold.frame) > 1.0:
                 missed.append(hold)
                 continue
             number = int(np.searchsorted(starts, at, side="right")) - 1
-            found[number] = slice(int(starts[number]), int(ends[number])), hold
-        return HeldContacts(touching, tuple(found[number] for number in sorted(found)), tuple(missed))
+            by_contact[number] = slice(int(starts[number]), int(ends[number])), hold
+        return HeldContacts(touching, tuple(by_contact[number] for number in sorted(by_contact)), tuple(missed))
 
     def held(self, frames: Array, standing: Mask) -> Mask:
-        """When the foot is held, (F,): while it stands (F,) and is not eased; at one frame of an eased contact at
+        """True while the foot is held, (F,): it stands (F,) and is not eased; at one frame of an eased contact at
         least."""
         held = standing.copy()
         for during, hold in self.contacts:
@@ -119,7 +119,7 @@ class HeldContacts:
         return displacement(rotation(turn), middle, middle)
 
     def bearing(self, under: Underside, sole: SoleMotion) -> Array:
-        """How much each point of an underside counts as held, (F, Q), 1 in all of a frame."""
+        """Weight of each point of an underside as held, (F, Q), 1 in all of a frame."""
         weight = under.bearing()
         for during, hold in self.contacts:
             if hold.mode == "FULL":
@@ -130,19 +130,17 @@ class HeldContacts:
                 weight[during] = np.arange(weight.shape[1]) == nearest
         return weight
 
-    def faded(self, sole: SoleMotion, carry: Array, lift: Array) -> tuple[Array, Array]:
-        """Displacements (F, 4, 4) and lifts (F,) of a foot by the strength of each contact, smoothly from one to the
-        next."""
+    def faded(self, sole: SoleMotion, carry: Array) -> Array:
+        """Displacements (F, 4, 4) of a foot by the strength of each contact, smoothly from one to the next."""
         if all(hold.strength == 1.0 for _, hold in self.contacts):
-            return carry, lift
+            return carry
         strength = np.ones(len(carry))
         for during, hold in self.contacts:
             strength[during] = hold.strength
         strength = between_contacts(strength, self.touching)
         middle = posed_points(sole).mean(axis=1)
         turn = rotation(strength[:, None] * rotation_vectors(carry[:, :3, :3]))
-        faded = displacement(turn, middle, middle + strength[:, None] * (carried(carry, middle) - middle))
-        return faded, strength * lift
+        return displacement(turn, middle, middle + strength[:, None] * (carried(carry, middle) - middle))
 
 
 def _slowest(points: Array) -> int:
@@ -153,7 +151,7 @@ def _slowest(points: Array) -> int:
 
 
 def _normal(points: Array, floor: PressedGround, frame: float) -> Array:
-    """Of the floor under points (Q, 3), (3,); upward where there is none."""
+    """Normal of the floor under points (Q, 3), (3,); upward where there is none."""
     height = floor.heights(points[None, :, 0], points[None, :, 1], np.full((1, len(points)), frame))
     slope = fitted_slope(np.concatenate([points[None, :, :2], height[..., None]], axis=-1), np.ones(height.shape))[0]
     return np.array([-np.tan(slope[0]), -np.tan(slope[1]), 1.0])

@@ -1,4 +1,4 @@
-"""Where the artist's moved and turned steps take the feet, and how far the legs reach there."""
+"""Displacement of the feet to the artist's moved and turned steps, as far as the legs reach."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..legs.foot_lock import eased, turned_level
+from ..legs.grounding import leg_of, leg_soles, out_of_reach
+from ..legs.hips import hips_go_along
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import runs
 from ..numerics.rigid import carried
 from ..record.edits import StepEdit, edits_by_number, step_id
 from ..record.footprints import Footprint
-from .foot_lock import eased, turned_level
-from .grounding import hips_go_along, leg_of, leg_soles, out_of_reach
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,14 +46,14 @@ class OutOfReach:
 
 @dataclass(frozen=True)
 class Followed:
-    """What takes feet to their moved steps.
+    """Displacements of feet to their moved steps.
 
     Attributes
     ----------
     carries : mapping of int to (F, 4, 4) float array
         By sole, its level displacement.
     hips : (F, 2) float array
-        How far the hips go along [m].
+        Displacement of the hips [m].
     out_of_reach : tuple of OutOfReach
     """
 
@@ -73,7 +74,7 @@ class _Moved:
     part: float = 1.0
 
     def shifts(self, points: Array, part: Array) -> Array:
-        """How far it takes level points (K, 2), going parts (P,) of the way, (P, K, 2)."""
+        """Displacements of level points (K, 2) after parts (P,) of the way, (P, K, 2)."""
         turned = turned_level(part[:, None] * self.turn, points - self.pivot)
         return np.asarray(turned + self.pivot - points + part[:, None, None] * self.move)
 
@@ -81,7 +82,7 @@ class _Moved:
 def follow(
     motion: CharacterMotion, touching: Mask, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
 ) -> Followed:
-    """What takes a character's feet where their steps were moved, as far as its legs reach.
+    """Displacements of a character's feet to their moved steps, as far as its legs reach.
 
     Parameters
     ----------
@@ -96,9 +97,9 @@ def follow(
     if not moved:
         return Followed()
     wanted = _hips(motion, touching, moved)
-    moved = [replace(one, part=_reached(motion, one, wanted)) for one in moved]
+    moved = [replace(step, part=_reached(motion, step, wanted)) for step in moved]
     carries = _carries(motion, touching, moved)
-    short = tuple(OutOfReach(one.step, one.part) for one in moved if one.part < 1.0)
+    short = tuple(OutOfReach(step.step, step.part) for step in moved if step.part < 1.0)
     return Followed(carries, _hips(motion, touching, moved), short)
 
 
@@ -122,7 +123,7 @@ def _moved(
 
 
 def _contact(frames: Array, touching: Mask, footprint: Footprint) -> slice | None:
-    """The samples of the contact that left a print."""
+    """The samples of the contact that made a print."""
     middle = (footprint.start_frame + footprint.end_frame) / 2
     spans = [slice(first, end) for first, end in zip(*runs(touching), strict=True)]
     nearest = min(spans, key=lambda span: abs(frames[span].mean() - middle), default=None)
@@ -134,19 +135,19 @@ def _contact(frames: Array, touching: Mask, footprint: Footprint) -> slice | Non
 def _carries(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> dict[int, Array]:
     """The displacement of each sole: as its steps, eased between contacts."""
     carries = {}
-    for sole in {one.sole for one in moved}:
+    for sole in {step.sole for step in moved}:
         middle = motion.soles[sole].landmark_positions()[..., :2].mean(axis=1)
         turn, shift = np.zeros(len(middle)), np.zeros_like(middle)
-        for one in moved:
-            if one.sole == sole:
-                turn[one.during] = one.part * one.turn
-                shift[one.during] = one.shifts(middle[one.during], np.array([one.part]))[0]
+        for step in moved:
+            if step.sole == sole:
+                turn[step.during] = step.part * step.turn
+                shift[step.during] = step.shifts(middle[step.during], np.array([step.part]))[0]
         carries[sole] = eased(middle, turn, shift, touching[:, sole])
     return carries
 
 
 def _hips(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> Array:
-    """How far the hips go along, (F, 2) [m]."""
+    """Displacement of the hips, (F, 2) [m]."""
     carries, offsets = _carries(motion, touching, moved), []
     feet = leg_soles(motion)
     for side, sole in feet.items():
@@ -155,11 +156,11 @@ def _hips(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> A
     return hips_go_along(motion, list(feet.values()), offsets, touching, HIPS_TIME)
 
 
-def _reached(motion: CharacterMotion, one: _Moved, hips: Array) -> float:
+def _reached(motion: CharacterMotion, step: _Moved, hips: Array) -> float:
     """The largest part of the way to a step for which the hips need not come down too far."""
-    leg, during = leg_of(motion, one.side, one.sole), one.during
+    leg, during = leg_of(motion, step.side, step.sole), step.during
     part = _PARTS[:, None, None]
-    aside, along = one.shifts(leg.ankle[during, :2], _PARTS), part * hips[during]
+    aside, along = step.shifts(leg.ankle[during, :2], _PARTS), part * hips[during]
     level = np.zeros((*aside.shape[:2], 1))
     hip = leg.hip[during] + np.concatenate([along, level], axis=-1)
     ankle = leg.ankle[during] + np.concatenate([aside, level], axis=-1)

@@ -1,6 +1,6 @@
-"""How people walk in deep ground, added on request: feet held longer and lifted higher, knees bent, arms out, slower.
+"""Acting of a walk in deep ground, on request: feet held longer and lifted higher, knees bent, arms out, slower.
 
-The more a character sinks, the more of it. None of this follows from the forces: it is acting, each part with a
+It grows with the sinkage. None of this follows from the forces: it is acting, each part with a
 strength of its own.
 """
 
@@ -24,11 +24,11 @@ DEEP = 0.15
 LONGEST_HOLD = 0.25
 """Most of a swing by which a foot that is held lags behind the source."""
 BENT = 0.5
-"""How much the hips go down to bend the knees, in sinkages."""
+"""Descent of the hips that bends the knees, in sinkages."""
 ARMS_OUT = np.radians(35.0)
-"""How far the arms are raised sideways [rad]."""
+"""Angle by which the arms are raised sideways [rad]."""
 DEPTH_TIME = 0.4
-"""Standard deviation of the smoothing of the sinkage that the body answers [s], for an adult."""
+"""Standard deviation of the smoothing of the sinkage that the body responds to [s], for an adult."""
 
 _FIRST_CENTIMETRE, _PER_CENTIMETRE = 0.30, 0.082
 """Cost of walking in snow over that on a road, less 1: 0.30 + 0.082 per cm of sinkage (Pandolf, Haisman and Goldman
@@ -40,7 +40,7 @@ about 10 % slower (Lejeune, Willems and Heglund 1998, J. Exp. Biol. 201)."""
 
 @dataclass(frozen=True)
 class Performance:
-    """How strongly each part is acted, 0 (not at all) to 1.
+    """Strength of each part, 0 (not acted) to 1.
 
     Attributes
     ----------
@@ -61,12 +61,12 @@ class Performance:
 
     @property
     def is_none(self) -> bool:
-        """Whether nothing is acted."""
+        """True if nothing is acted."""
         return not (self.knee_lift or self.hold or self.crouch or self.arms)
 
 
 def sinkage_over_time(sinkage: Array, touching: Mask) -> Array:
-    """How deep a foot sinks in each contact, (F,) [m], straight from the end of one to the start of the next."""
+    """Largest sinkage of a foot in each contact, (F,) [m], linear from the end of one to the start of the next."""
     result = np.zeros(len(sinkage))
     known = np.zeros(len(sinkage), dtype=bool)
     for first, end in zip(*runs(touching), strict=True):
@@ -79,7 +79,7 @@ def sinkage_over_time(sinkage: Array, touching: Mask) -> Array:
 
 
 def swing_progress(touching: Mask) -> Array:
-    """How far each swing between two contacts is, (F,) from 0 to 1; 0 while it stands or nothing is known."""
+    """Progress of each swing between two contacts, (F,) from 0 to 1; 0 while the foot stands or nothing is known."""
     progress = np.zeros(len(touching))
     for first, end in zip(*runs(~touching), strict=True):
         if first > 0 and end < len(touching):
@@ -88,7 +88,7 @@ def swing_progress(touching: Mask) -> Array:
 
 
 def swing_change(path: Array, depth: Array, touching: Mask, performance: Performance, leg_length: float) -> Array:
-    """What a foot's swing gets on top, (F, 3) [m]: height, and on the level a lag that is made up for before it lands.
+    """Addition to a foot's swing, (F, 3) [m]: height, and on the level a lag that is made up for before it lands.
 
     Parameters
     ----------
@@ -114,14 +114,14 @@ def swing_change(path: Array, depth: Array, touching: Mask, performance: Perform
 
 
 def body_depth(depths: Mapping[str, Array], width: float) -> Array:
-    """The sinkage that the whole body answers (F,) [m]: the mean of its feet's, smooth over `width` samples."""
+    """Sinkage that the whole body responds to (F,) [m]: the mean of its feet's, smooth over `width` samples."""
     return smoothed(np.mean(list(depths.values()), axis=0), width)
 
 
 def raised_arms(
     shoulders: Mapping[str, Array], ahead: Array, depth: Array, strength: float, leg_length: float
 ) -> dict[str, Array]:
-    """What raises each upper arm sideways about its shoulder, (F, 4, 4) by side.
+    """Rotation of each upper arm sideways about its shoulder, (F, 4, 4) by side.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How a character answers the ground it presses: the composer of tilt and grounding (MODEL.md section 5)."""
+"""Response of a character to the ground it presses: the composer of tilt and grounding (docs/model.md section 5)."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import FlatTerrain, Terrain
+from ..legs.foot_lock import moved
+from ..legs.foot_placement import Placement, lowest_clearance, place_sole, posed_points
+from ..legs.grounding import Response, heel_rises, leg_of, leg_soles, responding, settle, with_sole
 from ..loads.contacts import Contacts, detect_contacts
-from ..motion.motion import CharacterMotion, SoleMotion
+from ..motion.motion import CharacterMotion
+from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
-from .foot_lock import moved
-from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
-from .grounding import Response, heel_rises, leg_of, leg_soles, responding, settle, with_sole
 from .moved_steps import Followed
 from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
@@ -29,15 +30,15 @@ Mask = NDArray[np.bool_]
 HEADING_TIME = 0.25
 """Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""
 SUPPORT_TIME = 0.04
-"""Standard deviation of the smoothing of what holds a body over its support [s], for an adult: a foot loads and
+"""Standard deviation of the smoothing of a body's support [s], for an adult: a foot loads and
 unloads in about a tenth of a second."""
 RING_WEIGHT = 0.15
-"""What a place of the ring around the body counts beside one under a sole that stands."""
+"""Weight of a place of the ring around the body over one under a sole that stands."""
 
 
 @dataclass(frozen=True)
 class TiltOptions:
-    """How the body leans.
+    """Options of the body's lean.
 
     Attributes
     ----------
@@ -55,16 +56,16 @@ class TiltOptions:
 
 @dataclass(frozen=True)
 class GroundingOptions:
-    """How the feet find the ground.
+    """Options of the feet on the ground.
 
     Attributes
     ----------
     align : float
-        How much of the ground's slope the feet take on, 0 to 1.
+        Share of the ground's slope that the feet take on, 0 to 1.
     lock : float
-        How much of the source's sliding is taken out of contacts, 0 to 1.
+        Share of the source's sliding that is taken out of contacts, 0 to 1.
     performance : Performance
-        What is acted on top.
+        Acting on top.
     """
 
     align: float = 1.0
@@ -74,7 +75,7 @@ class GroundingOptions:
 
 @dataclass(frozen=True)
 class Gaps:
-    """How far the lowest point of each sole is off the ground while it touches.
+    """Distances of the lowest point of each sole from the ground while it touches.
 
     Attributes
     ----------
@@ -165,7 +166,7 @@ def respond(
 def _acted(
     motion: CharacterMotion, touching: Mask, placements: Mapping[str, tuple[int, Placement]], acting: Performance
 ) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
-    """What is acted on top: displacement of each foot, how much deeper the hips go, and what raises the arms."""
+    """Acting on top: displacement of each foot, descent of the hips, and rotations that raise the arms."""
     if acting.is_none or not placements:
         return {}, None, {}
     depths = {
@@ -198,7 +199,7 @@ def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt:
 
 
 def _support(motion: CharacterMotion, touching: Mask) -> Array:
-    """How far something holds the body (F,), from 0 to 1."""
+    """Support of the body (F,), from 0 to 1."""
     width = SUPPORT_TIME * motion.adult_second
     return smoothed(touching.any(axis=1).astype(float), width)
 
@@ -234,7 +235,7 @@ def gaps(
     footprints: Sequence[Footprint],
     posed: Callable[[SoleMotion], Array] = posed_points,
 ) -> Slices[Gaps]:
-    """Distance of each standing sole's lowest point from the ground as it is at that frame; of those points of it."""
+    """Distance of the lowest of each standing sole's `posed` points from the ground as it is at that frame."""
     history = GroundHistory(terrain, footprints)
     frames, soles, heights = [], [], []
     for index, sole in enumerate(motion.soles):
@@ -266,7 +267,7 @@ def _clearance(
 
 @sliced
 def stood_on(motion: CharacterMotion, terrain: Terrain) -> Slices[CharacterMotion]:
-    """The motion on the terrain that it will walk on: as it is where it was made for it, else put on it.
+    """The motion on the terrain: unchanged if it was made for it, else put on it.
 
     A walk that was made for level ground and is placed on a hill or on bumps touches nothing as it is. Its contacts
     are those with the level that it was made for; its feet keep the heights above the terrain that they had above the
@@ -308,7 +309,7 @@ _SHORTER = 0.8
 
 
 def _is_uneven(motion: CharacterMotion, terrain: Terrain) -> bool:
-    """Whether the ground under the paths of the soles is anything but level."""
+    """True if the ground under the paths of the soles is not level."""
     paths = np.concatenate([sole.landmark_positions().reshape(-1, 3) for sole in motion.soles])
     heights = terrain.heights(paths[:, 0], paths[:, 1])
     heights = heights[np.isfinite(heights)]
@@ -319,12 +320,12 @@ def _contacts_with_level(motion: CharacterMotion) -> Contacts | None:
     """Contacts with the level that the soles stand on; None where they stand at no one height."""
     lowest = [sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles]
     low = float(np.median([np.percentile(height, 10.0) for height in lowest]))
-    contacts = detect_contacts(motion, FlatTerrain(low))  # which takes out what each sole floats above it
+    contacts = detect_contacts(motion, FlatTerrain(low))  # which takes out the float of each sole
     return contacts if np.isfinite(contacts.offset).all() else None
 
 
 def _fits_better(motion: CharacterMotion, level: Contacts, terrain: Contacts) -> bool:
-    """Whether the motion was made for one level rather than for the terrain, by its contacts with both."""
+    """True if the motion was made for one level rather than for the terrain, by its contacts with both."""
     standing = terrain.clearance[terrain.touching]
     spread = float(np.std(standing)) if len(standing) else 0.0
     return bool(len(standing) < _SHORTER * level.touching.sum() or spread > _SAME_GROUND * motion.leg_length)

@@ -1,4 +1,4 @@
-"""The travel that a cycle on the spot lacks, by what rests: root motion."""
+"""Root motion: the travel that a cycle on the spot lacks, by its resting pieces of soles."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
+from ..legs.foot_lock import rolled, underside_on
 from ..loads.estimate import CharacterLoads
 from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
-from .foot_lock import rolled, underside_on
 from .response import at_scene_frames
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 BOTH = 0.5
-"""Pieces of a sole with this part as many points on the belt both tell its speed, while the foot rolls over them."""
+"""Pieces of a sole with this part as many points on the belt both count for its speed, as the foot rolls over them."""
 AGREES = 0.05
-"""What moves as the median does, to about this part of its speed, rests on the belt; the rest lands or leaves."""
+"""Pieces rest on the belt that move as the median does, to about this part of its speed; the rest land or leave."""
 
 
 @sliced
@@ -46,7 +46,7 @@ def lacking_velocity(motion: CharacterMotion, loads: CharacterLoads, terrain: Te
 
 @sliced
 def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[Array]:
-    """Velocity (2,) that makes what bears rest: against that of the belt under it [m/s].
+    """Velocity (2,) that makes the bearing skin rest: against that of the belt under it [m/s].
 
     A foot rolls over heel, ball and toes, so that its velocity is that of the points that bear. Each frame has one
     vote, however many feet stand: the hips of a cycle may be held where the walk would have them surge.

@@ -1,4 +1,4 @@
-"""The balance controller: how a body leans on ground that slopes or gives way (MODEL.md section 5; the paper, Eq. 1).
+"""Balance controller: lean of a body on ground that slopes or gives way (docs/model.md section 5; the paper, Eq. 1).
 
 The body is a rigid capsule that pivots about its support. A source animation is made for level ground: where the
 ground slopes, its centre of mass counts as carried along with the ground's normal, behind the support uphill and
@@ -26,7 +26,7 @@ RADIUS = 0.1
 
 @dataclass(frozen=True)
 class TiltGains:
-    """How a body swings back to balance, the same for a mouse and a giant.
+    """Constants of a body's swing back to balance, the same for a mouse and a giant.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class TiltGains:
 
     @classmethod
     def from_torques(cls, alpha: float, beta: float, *, inertia: float, arm: float) -> TiltGains:
-        """From the paper's gains.
+        """Constants from the paper's gains.
 
         Parameters
         ----------
@@ -56,11 +56,6 @@ class TiltGains:
         """
         natural = sqrt(alpha * arm / inertia)
         return cls(natural / (2 * pi), beta / (2 * inertia * natural))
-
-    def torques(self, *, inertia: float, arm: float) -> tuple[float, float]:
-        """The paper's alpha [N] and beta [N·m·s] of a body: I·w²/l and 2·zeta·I·w."""
-        natural = 2 * pi * self.frequency
-        return inertia * natural**2 / arm, 2 * self.damping * inertia * natural
 
 
 PAPER_TORQUES = (30.0, 6.0)
@@ -167,7 +162,7 @@ def _swing(
 
 
 RING = 0.35
-"""Radius of the ground around the body that it sees beside what its soles stand on, in leg lengths."""
+"""Radius of the ground around the body that it senses beside that under its soles, in leg lengths."""
 _RING_POINTS = 8
 
 

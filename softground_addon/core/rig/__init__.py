@@ -1,1 +1,1 @@
-"""What was read of a rig, as plain arrays, and the motion that it comes to."""
+"""Data read from a rig, as plain arrays, and its motion."""

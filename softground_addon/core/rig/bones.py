@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..motion.motion import Array
 
 
@@ -37,6 +39,19 @@ RigBones = Mapping[str, RestBone]
 """The bones of a rig by name."""
 
 
+def extent(heads: Array, to_world: Array) -> float:
+    """Largest extent of joints (N, 3) under a matrix (4, 4), however that turns them: a rig's height, or its length."""
+    lengths = np.ptp(heads, axis=0) * np.linalg.norm(to_world[:3, :3], axis=0) if len(heads) else np.zeros(1)
+    return float(lengths.max())
+
+
+def stature(heads: Array, to_world: Array) -> float:
+    """Height of a body by its joints (N, 3) under a matrix (4, 4), or a third of their extent if they are low; the unit
+    of its file is judged by it."""
+    height = float(np.ptp(heads @ to_world[2, :3])) if len(heads) else 0.0
+    return max(height, extent(heads, to_world) / 3)
+
+
 def above(bones: RigBones, name: str) -> Iterator[str]:
     """Names of the bones on which one hangs, nearest first."""
     while name := bones[name].parent:
@@ -57,9 +72,9 @@ def family(bones: RigBones, name: str, ends: Set[str] = frozenset()) -> frozense
     >>> list(above(bones, "toe"))
     ['foot', 'leg']
     """
-    found = set()
+    members = set()
     for other in bones:
         chain = [other, *above(bones, other)]
         if name in chain and ends.isdisjoint(chain[: chain.index(name)]):
-            found.add(other)
-    return frozenset(found)
+            members.add(other)
+    return frozenset(members)

@@ -1,4 +1,4 @@
-"""What the parts of a rig are."""
+"""Roles of the parts of a rig."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ BoneEnd = tuple[str, str]
 
 @dataclass(frozen=True)
 class RigMapping:
-    """What the parts of a rig are.
+    """Roles of the parts of a rig.
 
     Attributes
     ----------
     joints : mapping of str to BoneEnd
         Canonical joint (`core.motion.motion.JOINTS`) to the end of a bone.
     soles : tuple of SoleSource
-        What prints, feet first.
+        Sources of prints, feet first.
     method : str
-        How they were found: by "names" or "rest pose", or as the "settings" have them.
+        Their source: "names", "rest pose" or "settings".
     mass : float
-        That its skin suggests [kg], 0 where none does.
+        Suggested by its skin [kg], 0 where none does.
     """
 
     joints: Mapping[str, BoneEnd] = field(default_factory=dict)

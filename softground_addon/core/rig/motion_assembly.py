@@ -1,4 +1,4 @@
-"""From recorded matrices to a `CharacterMotion`: which sole each foot has and how its bones carry it."""
+"""A `CharacterMotion` from recorded matrices: the sole of each foot and the bones that carry it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array, CharacterMotion, SoleMotion
+from ..motion.motion import CENTRE, Array, CharacterMotion
 from ..motion.props import capsule
+from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import displacement, nearest_rotation, unit
 from ..settings import SoleSource
@@ -25,11 +26,12 @@ from ..soles.foot_attitude import (
     standing_up,
 )
 from ..soles.soles import PlacedSole, prop_sole
-from .bones import RigBones
+from .bones import RigBones, stature
 from .mapping import RigMapping
 from .recording import Recording
 from .rig_at_rest import RestPose
 from .rig_skin import RigSkin
+from .skin_mass import centre_of_volume
 from .skin_stances import SkinStances
 from .sole_extraction import bone_families, foot_sole, limb_family, skin_meshes
 
@@ -71,7 +73,7 @@ def assemble_motion(
     carried : mapping of str to SoleMotion
         The objects that print, by name of the sole.
     stances : SkinStances, optional
-        When the skin bears, and how the feet lie then.
+        Bearing of the skin, and attitude of the feet.
 
     Raises
     ------
@@ -82,7 +84,7 @@ def assemble_motion(
     frame_rate, gravity = recording.units.frame_rate, recording.units.gravity_m_s2
     leg = rest.leg_length(mapping)
     if not rest.is_upright:
-        stances = None  # where the whole rig is tilted, what its feet stand on is tilted with it
+        stances = None  # where the whole rig is tilted, the ground under its feet is tilted with it
 
     sources = [source for source in mapping.soles if not source.object and not source.limb]
     standing = stances.standing if stances else {}
@@ -113,6 +115,14 @@ def assemble_motion(
         for sole, bears in stances.bears.items():
             motions[sole] = _at_its_skin(replace(motions[sole], bears=bears), stances.low.get(sole))
 
+    joints = {
+        joint: along_bone(recording.bone(bone), 0.0 if end == "head" else bones[bone].length)
+        for joint, (bone, end) in mapping.joints.items()
+    }
+    unknown_above = joints.keys().isdisjoint(("neck", "shoulder_l", "shoulder_r"))
+    if skin and joints and unknown_above and {*skin.bones} <= {*recording.bones}:
+        joints[CENTRE] = centre_of_volume(skin, bones, recording)
+
     return CharacterMotion(
         name=name,
         mass=mass,
@@ -120,14 +130,13 @@ def assemble_motion(
         frames=recording.frames,
         frame_rate=frame_rate,
         soles=tuple(motions[source.name] for source in mapping.soles),
-        joints={
-            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else bones[bone].length)
-            for joint, (bone, end) in mapping.joints.items()
-        },
+        joints=joints,
         gravity=gravity,
         four_legged=rest.is_four_legged(mapping),
         ground_level=stances.level if stances else None,
         skin=stances.skin if stances else None,
+        bones_move=recording.bones_move,
+        stature=stature(np.array([bone.head for bone in bones.values()]), recording.armature[0]),
     )
 
 
@@ -138,7 +147,7 @@ STEEP = 0.3
 """Horizontal part of a bone over its length, up to which it points nowhere in plan."""
 
 GIVE = 0.04
-"""How far flesh gives way where it touches, over the size of the limb: 3 mm for a hand, 1 cm for a trunk."""
+"""Compression of flesh where it touches, over the size of the limb: 3 mm for a hand, 1 cm for a trunk."""
 
 
 def _limb_motions(
@@ -256,7 +265,7 @@ def _flat_feet(
     leg: float,
     modelled: Collection[str],
 ) -> list[FlatFoot]:
-    """How each foot stands; `modelled` are the names of those that have a mesh."""
+    """Attitude of each standing foot; `modelled` are the names of those that have a mesh."""
     images = _mirror_images(feet)
     flats = []
     for place, foot in enumerate(feet):
@@ -276,15 +285,15 @@ def _stand(
     leg: float,
     seen: bool,
 ) -> FlatFoot:
-    """How a foot stands, from its own planted instants and, reflected, from those of its mirror image.
+    """Attitude of a standing foot, from its own planted instants and, reflected, from those of its mirror image.
 
     A foot that is `seen` on a mesh and nearly flat at rest is flat there.
 
-    It stands level in the world or, where the whole rig is tilted, level in the rig: whichever is nearer to how it
-    stands at rest.
+    It stands level in the world or, where the whole rig is tilted, level in the rig: whichever is nearer to its
+    attitude at rest.
     """
 
-    foot, own = feet[place], planted[place]
+    foot, instants = feet[place], planted[place]
     if foot.stands:
         ahead = _pointing(foot, UP, facing, leg)
         return flat_foot(foot.ankle, foot.hinge, ahead, foot_up=UP, toe_up=UP, toe_turns=np.eye(3)[None])
@@ -299,14 +308,14 @@ def _stand(
 
     foot_motions, toe_motions = [other.motion for other in feet], [other.toe_motion for other in feet]
     levels = (np.broadcast_to(np.eye(3), rest.tilts.shape), rest.tilts)
-    foot_up, tilts = max(((standing(foot_motions, level), level) for level in levels), key=lambda found: found[0] @ UP)
+    foot_up, tilts = max(((standing(foot_motions, level), level) for level in levels), key=lambda pair: pair[0] @ UP)
     return flat_foot(
         foot.ankle,
         foot.hinge,
         _pointing(foot, foot_up, facing, leg, seen=seen),
         foot_up=foot_up,
         toe_up=standing(toe_motions, tilts),
-        toe_turns=np.swapaxes(foot.toe_motion[own, :3, :3], -1, -2) @ foot.motion[own, :3, :3],
+        toe_turns=np.swapaxes(foot.toe_motion[instants, :3, :3], -1, -2) @ foot.motion[instants, :3, :3],
     )
 
 
@@ -314,7 +323,7 @@ _STUB = 0.02
 """Length of a foot bone over the leg's, below which it points nowhere."""
 
 _STEEPEST = np.cos(np.radians(18.0))
-"""A foot bone closer than this to the vertical does not tell where the toes are."""
+"""A foot bone closer than this to the vertical does not show where the toes are."""
 
 
 def _pointing(foot: _Foot, up: Array, facing: Array, leg: float, *, seen: bool = True) -> Array:
@@ -333,7 +342,7 @@ def _pointing(foot: _Foot, up: Array, facing: Array, leg: float, *, seen: bool =
 
 
 def _mirror_images(feet: Sequence[_Foot]) -> list[dict[int, Array]]:
-    """For each foot, the others that are its mirror image in the rest pose, with the (3, 3) reflection."""
+    """Mirror images of each foot among the others in the rest pose, with the (3, 3) reflection."""
     images: list[dict[int, Array]] = [{} for _ in feet]
     for i, foot in enumerate(feet):
         for j, other in enumerate(feet):
@@ -350,7 +359,7 @@ def _mirror_images(feet: Sequence[_Foot]) -> list[dict[int, Array]]:
 
 
 def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[NDArray[np.bool_]]) -> list[FootSize]:
-    """Left and right foot of one size where their bones are, each counting by how long it was seen standing."""
+    """Left and right foot of one size where their bones are, each weighted by the time for which it stands."""
     instants = np.array([float(stands.sum()) for stands in planted]) + 1e-6
     bones = np.array([float(np.linalg.norm(foot.hinge - foot.ankle)) for foot in feet])
     values = np.array([(size.length, size.ankle_height) for size in sizes]).reshape(-1, 2)
@@ -365,5 +374,5 @@ def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[
 def _rigid_motion(matrices: Array, rest: Array) -> Array:
     """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
     back = np.linalg.inv(rest[:3, :3])
-    turn = in_stretches(lambda some: nearest_rotation(matrices[some, :3, :3] @ back), len(matrices))
+    turn = in_stretches(lambda stretch: nearest_rotation(matrices[stretch, :3, :3] @ back), len(matrices))
     return displacement(turn, rest[:3, 3], matrices[:, :3, 3])

@@ -1,9 +1,9 @@
-"""Where the bones of a rig are over time, as they were read."""
+"""Poses of the bones of a rig over time, as they were read."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from ..motion.motion import Array
 from ..settings import SceneUnits
 
+_STILL = 1e-4
+"""Poses that differ by less are one, over their largest entry."""
+
 
 @dataclass(frozen=True)
 class Recording:
-    """Where bones and objects are over time, as evaluated; a bone's y axis points from head to tail.
+    """Poses of bones and objects over time, as evaluated; a bone's y axis points from head to tail.
 
     Attributes
     ----------
@@ -29,6 +32,8 @@ class Recording:
         World matrices of the objects by their names [m].
     units : SceneUnits
         What frames and Blender units come to.
+    shapes : mapping of (object, shape key) to (F,) float array
+        Values of shape keys.
     """
 
     frames: Array
@@ -37,11 +42,17 @@ class Recording:
     world: Array
     props: Mapping[str, Array]
     units: SceneUnits
+    shapes: Mapping[tuple[str, str], Array] = field(default_factory=dict)
 
     @property
     def armature(self) -> Array:
         """World matrices of the armature, (F, 4, 4) [m]."""
         return self._in_metres(self.world.copy())
+
+    @property
+    def bones_move(self) -> bool:
+        """True if some bone moves in the armature."""
+        return bool(np.ptp(self.poses, axis=0).max(initial=0.0) > _STILL * np.abs(self.poses).max(initial=0.0))
 
     def bone(self, name: str) -> Array:
         """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
@@ -50,8 +61,14 @@ class Recording:
 
     def of(self, samples: NDArray[np.intp]) -> Recording:
         """Some of the samples."""
-        props = {name: matrices[samples] for name, matrices in self.props.items()}
-        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], props, self.units)
+        return replace(
+            self,
+            frames=self.frames[samples],
+            poses=self.poses[samples],
+            world=self.world[samples],
+            props={name: matrices[samples] for name, matrices in self.props.items()},
+            shapes={key: values[samples] for key, values in self.shapes.items()},
+        )
 
     def _in_metres(self, matrices: Array) -> Array:
         matrices[..., :3, :] *= self.units.unit_scale_m

@@ -1,4 +1,4 @@
-"""A rig at rest, standing upright: what its size, its sides and its soles are measured on."""
+"""A rig at rest, standing upright, on which its size, its sides and its soles are measured."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RestPose:
     world : (4, 4) float array
         Armature space to world [m].
     tilts : (F, 3, 3) float array
-        Rotations from upright to how the armature's own upward axis lies in each frame.
+        Rotations from upright to the armature's own upward axis in each frame.
     """
 
     bones: RigBones
@@ -41,7 +41,7 @@ class RestPose:
 
     @classmethod
     def of(cls, bones: RigBones, mapping: RigMapping, placed: Array) -> RestPose:
-        """From the armature's matrices over time, (F, 4, 4) [m]."""
+        """The rest pose from the armature's matrices over time, (F, 4, 4) [m]."""
         ups = unit(placed[:, :3, :3] @ _own_up(bones, mapping, placed[0]))
         tilts = rotation(turn_between(np.broadcast_to(UP, ups.shape), ups))
         world = placed[0].copy()
@@ -54,7 +54,7 @@ class RestPose:
 
     @property
     def is_upright(self) -> bool:
-        """Whether the armature stands upright in every frame."""
+        """True if the armature stands upright in every frame."""
         return bool(self.tilts[:, 2, 2].min() > _UPRIGHT)
 
     def matrix(self, bone: str) -> Array:
@@ -77,7 +77,7 @@ class RestPose:
         return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
 
     def is_four_legged(self, mapping: RigMapping) -> bool:
-        """Whether the trunk lies across the legs, and the arms along them."""
+        """True if the trunk lies across the legs, and the arms along them."""
         names = [f"{joint}_{side}" for joint in ("hip", "ankle", "shoulder", "wrist") for side in "lr"]
         if any(name not in mapping.joints for name in names):
             return False
@@ -93,7 +93,7 @@ class RestPose:
         return ahead / length if length > 0 else np.array((0.0, -1.0, 0.0))
 
     def _across(self, mapping: RigMapping) -> Array:
-        """From a joint on the right to the same on the left."""
+        """Vector from a joint on the right to the same on the left."""
         for joint in ("hip", "shoulder", "knee", "ankle"):
             if f"{joint}_l" in mapping.joints and f"{joint}_r" in mapping.joints:
                 across = self.end(*mapping.joints[f"{joint}_l"]) - self.end(*mapping.joints[f"{joint}_r"])

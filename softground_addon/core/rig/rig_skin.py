@@ -21,13 +21,35 @@ from .recording import Recording
 
 Indices = NDArray[np.intp]
 
+_AGAINST = 0.01
+"""Boxes around parts that are nearer than this over the size of the mesh touch."""
+
 _WELD = 1e-5
 """Vertices nearer than this over the size of the mesh are one."""
 
 
 @dataclass(frozen=True)
+class Shape:
+    """What a keyed shape adds to a skin at a value of 1.
+
+    Attributes
+    ----------
+    key : (object, shape key)
+        Names, by which its values are recorded.
+    vertices : (N,) int array
+        Those that it moves.
+    offset : (N, 3) float array
+        In the armature's space, before bones move them [Blender units].
+    """
+
+    key: tuple[str, str]
+    vertices: Indices
+    offset: Array
+
+
+@dataclass(frozen=True)
 class RigSkin:
-    """The meshes of a rig in its rest pose, and what moves them.
+    """The meshes of a rig in its rest pose, and the bones that move them.
 
     Attributes
     ----------
@@ -37,11 +59,13 @@ class RigSkin:
     bones : tuple of str
         Names of the bones that move some vertex; the armature itself is the last part, without a name here.
     weights : tuple of (vertices, weights) for each bone
-        Which vertices (N,) a bone moves, and how much (N,).
+        Vertices (N,) that a bone moves, and their weights (N,).
     part : (V,) int array
         The bone that moves each vertex most, as an index; that of the armature where none does.
     hung : (V,) bool array
         Of objects that hang on a bone instead of being deformed.
+    shapes : tuple of Shape
+        Those that are keyed.
     """
 
     vertices: Array
@@ -50,9 +74,10 @@ class RigSkin:
     weights: tuple[tuple[Indices, Array], ...]
     part: Indices
     hung: NDArray[np.bool_]
+    shapes: tuple[Shape, ...] = ()
 
     def weight_of(self, bones: Collection[str]) -> Array:
-        """How much of each vertex some bones move, (V,)."""
+        """Share of each vertex that some bones move, (V,)."""
         total = np.zeros(len(self.vertices))
         for name, (vertex, weight) in zip(self.bones, self.weights, strict=True):
             if name in bones:
@@ -76,24 +101,34 @@ def skinned(
     """
     place = np.full(len(skin.vertices), -1, dtype=np.intp)
     place[chosen] = np.arange(len(chosen))
-    rest = np.column_stack([skin.vertices, np.ones(len(skin.vertices))])
     backs = [np.linalg.inv(bones[name].matrix) for name in skin.bones]
     frames, rows = len(recording.frames), len(range(3)[axes])
     result = np.zeros((frames, rows, len(chosen)), dtype=np.float32)  # one product for all frames is the fastest
     held = np.zeros(len(chosen), dtype=bool)
+
+    def add(matrices: Array, vertex: Indices, weight: Array) -> None:
+        """Add what a bone with some matrices (F, 4, 4) moves."""
+        moved = matrices[:, :3][:, axes].astype(np.float32)
+        rest = np.append(skin.vertices[vertex], np.ones((len(vertex), 1)), axis=1)
+        weighted = (weight[:, None] * rest).T.astype(np.float32)
+        result[..., place[vertex]] += (moved.reshape(-1, 4) @ weighted).reshape(frames, rows, -1)
+        for shape in skin.shapes:
+            at = np.searchsorted(shape.vertices, vertex).clip(max=len(shape.vertices) - 1)
+            shaped = shape.vertices[at] == vertex
+            if shaped.any():
+                mixed = moved[..., :3] * recording.shapes[shape.key].astype(np.float32)[:, None, None]
+                offset = (weight[shaped, None] * shape.offset[at[shaped]]).T.astype(np.float32)
+                result[..., place[vertex[shaped]]] += (mixed.reshape(-1, 3) @ offset).reshape(frames, rows, -1)
+
     for name, back, (moved_by, weights) in zip(skin.bones, backs, skin.weights, strict=True):
         here = place[moved_by] >= 0
         if not here.any():
             continue
-        vertex, weight = moved_by[here], weights[here]
-        moved = (recording.bone(name) @ back)[:, :3][:, axes].reshape(-1, 4).astype(np.float32)
-        weighted = (weight[:, None] * rest[vertex]).T.astype(np.float32)
-        result[..., place[vertex]] += (moved @ weighted).reshape(frames, rows, -1)
-        held[place[vertex]] = True
+        add(recording.bone(name) @ back, moved_by[here], weights[here])
+        held[place[moved_by[here]]] = True
         yield
     if not held.all():
-        unheld = recording.armature[:, :3][:, axes].reshape(-1, 4)
-        result[..., ~held] = (unheld @ rest[chosen[~held]].T).reshape(frames, rows, -1)
+        add(recording.armature, chosen[~held], np.ones(np.count_nonzero(~held)))
     return np.swapaxes(result, 1, 2)
 
 
@@ -101,7 +136,7 @@ _PROBES = 8
 """Poses in which the vertices near the ground are looked for."""
 
 _NEAR = 0.15
-"""Vertices that never come this near to the lowest are left out, in body heights."""
+"""Distance from the lowest vertex that a followed one comes within, in body heights."""
 
 _MOST_POINTS = 1500
 """Vertices that are followed at most."""
@@ -140,7 +175,7 @@ def followed_skin(
     rate : float
         Samples per second [Hz].
     linked : bool
-        Whether to tell which parts hang together, and which are mirror images.
+        True to find parts that hang together, and mirror images.
     """
     body = np.flatnonzero(~carried(skin, bones))
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
@@ -159,19 +194,20 @@ def followed_skin(
     if not np.isfinite(places).all():
         return None
     yield
-    links = twin = None
+    links = twin = beside = None
     if linked:
         links = _links(skin, bones)[np.ix_(used, used)]
         yield
         place = np.full(len(skin.bones) + 1, -1)
         place[used] = np.arange(len(used))
+        beside = _beside(skin, used)
         twin = place[twins(skin.vertices[body], skin.part[body], len(place))[used]]
-    motion = SkinMotion(places, part, links, rate, size, twin)
+    motion = SkinMotion(places, part, links, rate, size, twin, beside)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
 
 
 def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
-    """Which points to follow of parts with so many each (P,): of large parts fewer, evenly, until `most` are left."""
+    """True for points to follow of parts with counts (P,): of large parts fewer, evenly, until `most` remain."""
     ordered = np.sort(counts)
     caps = (most - np.cumsum(ordered) + ordered) / np.arange(len(counts), 0, -1)
     cap = caps[(caps <= ordered).argmax()] if counts.sum() > most else ordered[-1]
@@ -182,7 +218,7 @@ def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
 
 
 def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
-    """Vertices of what a character carries: hung on bones that hang from bones with a skin.
+    """Vertices of props that a character carries: hung on bones that hang from bones with a skin.
 
     A robot of rigid pieces has no such skin above them; there they are its body.
     """
@@ -191,13 +227,22 @@ def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
     return skin.hung & np.array([*carries, False])[skin.part]
 
 
+def _beside(skin: RigSkin, parts: Indices) -> NDArray[np.bool_]:
+    """Which of some parts lie against each other at rest: boxes around them touch."""
+    corners = [(lie.min(axis=0), lie.max(axis=0)) for lie in (skin.vertices[skin.part == part] for part in parts)]
+    low, high = np.swapaxes(corners, 0, 1)
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=-1)
+    touching = gap < _AGAINST * np.ptp(skin.vertices, axis=0).max()
+    return touching & ~np.eye(len(parts), dtype=bool)
+
+
 def _links(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
-    """Which parts hang together, by welded skin or as parent and child, (P, P) with the armature's own last."""
+    """Links between parts, by welded skin or as parent and child, (P, P) with the armature's own last."""
     count = len(skin.bones) + 1
     links = np.zeros((count, count), dtype=bool)
     corners = skin.part[skin.triangles]
-    for one, other in ((0, 1), (1, 2), (2, 0)):
-        links[corners[:, one], corners[:, other]] = True
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        links[corners[:, start], corners[:, end]] = True
     # Imported meshes are cut open along their edges: vertices in one place are one.
     size = max(float(np.ptp(skin.vertices, axis=0).max()), 1e-12)
     _, place = np.unique(np.round(skin.vertices / (_WELD * size)), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""When the skin of a character's contacts bears, and how its feet lie then."""
+"""Times at which the skin of a character's contacts bears, and the attitude of its feet then."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ LONGEST = 3000
 
 @dataclass(frozen=True)
 class SkinStances:
-    """What the skin shows of a character's contacts.
+    """Contacts of a character as its skin shows them.
 
     Attributes
     ----------
     level : float
         Height of the ground [m].
     bears : mapping of str to (F,) bool array
-        When each contact bears, by name of the sole.
+        True while each contact bears, by name of the sole.
     standing : mapping of str to int
         The sample at which most of a foot's underside is on the ground.
     meshes : mapping of str to FootMesh
@@ -45,7 +45,7 @@ class SkinStances:
     low : mapping of str to (F,) float array
         Height of the lowest skin of each limb [m].
     skin : LowSkin
-        Where all of it is lowest.
+        Its lowest places.
     """
 
     level: float
@@ -65,30 +65,30 @@ def skin_stances(
     *,
     mass: float,
 ) -> Slices[SkinStances | None]:
-    """When some contacts of a character bear and how its feet lie, or None where their skin never comes down.
+    """Bearing of a character's contacts and attitude of its feet, or None where their skin never comes down.
 
     Parameters
     ----------
     skin : RigSkin
     bones : RigBones
     mapping : RigMapping
-        Its soles on bones are looked at.
+        Only its soles on bones count.
     recording : Recording
         Of all `skin.bones` and those of the soles.
     rate : float
         Samples per second [Hz].
     mass : float
-        That its volume suggests [kg], 0 where unknown.
+        Suggested by its volume [kg], 0 where unknown.
     """
     followed = yield from followed_skin.slices(skin, bones, recording, rate)
     if followed is None:
         return None
     yield
     sources = [source for source in mapping.soles if source.bone and not source.object]
-    own = {source.name: _bones_of(bones, source, mapping) for source in sources}
+    bones_of_sole = {source.name: _bones_of(bones, source, mapping) for source in sources}
     numbers: dict[str, int] = {}
     for number, source in enumerate(sources):
-        numbers = dict.fromkeys(own[source.name], number) | numbers
+        numbers = dict.fromkeys(bones_of_sole[source.name], number) | numbers
     group = np.array([numbers.get(bone, -1) for bone in followed.bones])
     present = np.unique(group[group >= 0])
     if not len(present):
@@ -110,7 +110,7 @@ def skin_stances(
     for source in feet:
         at = standing[source.name]
         band = floor[source.name][at] + SOLE_BAND * followed.motion.height
-        mesh = _mesh(skin, bones, source, own[source.name], recording.of(np.array([at])), band)
+        mesh = _mesh(skin, bones, source, bones_of_sole[source.name], recording.of(np.array([at])), band)
         if mesh is not None:
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
@@ -120,8 +120,8 @@ def skin_stances(
         if source.limb and number in present
     }
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
-    skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
-    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, skin_there)
+    lowest_skin = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
+    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, lowest_skin)
 
 
 def _bones_of(bones: RigBones, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
@@ -150,8 +150,8 @@ def _mesh(
 ) -> FootMesh | None:
     """The skin of a foot as it stands, where its faces reach down to a height; None without any face."""
     _, toes = bone_families(bones, source)
-    own = np.array([name in names for name in skin.bones] + [False])[skin.part]
-    candidates = np.flatnonzero(own[skin.triangles].all(axis=1))
+    of_foot = np.array([name in names for name in skin.bones] + [False])[skin.part]
+    candidates = np.flatnonzero(of_foot[skin.triangles].all(axis=1))
     used, triangles = np.unique(skin.triangles[candidates], return_inverse=True)
     if not len(used):
         return None

@@ -31,7 +31,7 @@ class FootMesh:
     vertices : (V, 3) float array
         World positions in the rest pose [m].
     toe_weight : (V,) float array
-        How much of each vertex moves with the toes.
+        Share of each vertex that moves with the toes.
     triangles : (T, 3) int array
     """
 
@@ -49,14 +49,14 @@ def foot_sole(
     ----------
     source : SoleSource
     flat : FlatFoot
-        How the foot stands.
+        Attitude of the standing foot.
     size : FootSize
-        What the bones tell; not used where there is a mesh.
+        Size by the bones; not used where there is a mesh.
     mesh : FootMesh or None
     has_toes : bool
-        Whether the toes bend.
+        True if the toes bend.
     mirrored : bool
-        Whether the armature is mirrored (negative scale), so that a foot named left has the shape of a right one.
+        True if the armature is mirrored (negative scale), so that a foot named left has the shape of a right one.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _moved(transform: Array, points: Array) -> Array:
 def skin_meshes(
     skin: RigSkin | None, families: Mapping[str, tuple[frozenset[str], frozenset[str]]], rest_world: Array
 ) -> dict[str, FootMesh]:
-    """The parts of a skin that move with families of bones, by name; of those with hardly any there is none.
+    """The parts of a skin that move with families of bones, by name; families with hardly any skin have none.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def skin_meshes(
     if skin is None:
         return {}
     meshes = {}
-    for name, (own, toes) in families.items():
-        weight = skin.weight_of(own)
+    for name, (members, toes) in families.items():
+        weight = skin.weight_of(members)
         used, triangles = np.unique(skin.triangles[(weight > _OWNED)[skin.triangles].all(axis=1)], return_inverse=True)
         if triangles.size >= 3 * _FEWEST_TRIANGLES:
             toe_weight = np.clip(skin.weight_of(toes)[used] / weight[used], 0.0, 1.0)

@@ -1,1 +1,1 @@
-"""Which parts of a character touch the ground, and when, from its deformed skin alone."""
+"""Parts of a character that touch the ground, and their times, from its deformed skin alone."""

@@ -1,4 +1,4 @@
-"""When each part bears: low, calm and moving with the ground, with hysteresis."""
+"""Bearing of each part: low, calm and moving with the ground, with hysteresis."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from ..numerics.intervals import hysteresis, runs
 from .skin_motion import CALM_SPEED, Array, Mask, PartTracks
 
 TOUCH, LEAVE = 0.015, 0.018
-"""A part lower than the first over the ground starts to bear, one higher than the second has left, in body heights."""
+"""A part below the first height over the ground starts to bear, one above the second has lifted, in body heights."""
 LEAVE_RISE = 2.0
-"""A bearing part that rises or falls faster than this many times the calm speed has left."""
+"""A bearing part that rises or falls faster than this many times the calm speed has lifted."""
 LEAVE_SLIP = 1.5
 """The same for its slip, over the limit for touching."""
 SLIP_OF_REST = 4.0
@@ -20,23 +20,23 @@ SLIP_SHARES = 0.15, 0.4
 LEAST_SLIP = 0.15
 """... and never less than this, in H/s."""
 STILL = 0.08
-"""What lies calm and low and still for longer stands, though the ground moves at other times: a jump on the spot begins
-and ends standing [s]."""
+"""Least time for which skin that lies calm, low and still stands, though the ground moves at other times [s]: a jump on
+the spot begins and ends standing."""
 BLIP = 0.05
-"""What bears no longer than this does not bear [s]; of shots of at most `FEW` samples it is all that is known."""
+"""Longest bearing that does not count [s], except in shots of at most `FEW` samples."""
 FEW = 4
 GLIMPSE = 0.08
-"""What bears no longer than this at an end of the shot, two frames at 24 Hz, shows little more than one step [s]."""
+"""Bearing at an end of the shot that shows little more than one step [s]: two frames at 24 Hz."""
 LANDED = TOUCH / 2
-"""What bears has landed when it is no higher than this over the ground, and over how it mostly stands."""
+"""Largest height of a part that has landed, over the ground and over its usual height while it stands."""
 DRAGS = 0.004
-"""What stays lower than this between two times of bearing slides on without leaving the ground, in body heights."""
+"""Height below which a part between two times of bearing slides on without leaving the ground, in body heights."""
 HARD_RISE, HARD_SLIP = 2.5, 0.12
 """A hard step: fast, but it hardly slips; over the calm speed, and over the part's fast slip."""
 
 
 def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
-    """When each part bears.
+    """True while each part bears.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
 
 
 def _lasting(state: Mask, longest: int) -> Mask:
-    """Without the runs of at most `longest` samples."""
+    """State without the runs of at most `longest` samples."""
     lasting = state.copy()
     for part in np.flatnonzero(state.any(axis=0)):
         for first, last in zip(*runs(state[:, part]), strict=True):
@@ -89,15 +89,15 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
     lasting = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(bears[:, part]), strict=True):
-            # What bears at an end of the shot may go on beyond it; at a single frame, nobody saw it slow down.
+            # Bearing at an end of the shot may go on beyond it; at a single frame it cannot be seen to slow down.
             least = 1 if first == 0 or last == len(bears) else longest
             lasting[first:last, part] = last - first > least
     return lasting
 
 
 def _without_gaps(bears: Mask, low: Mask, longest: int) -> Mask:
-    """With the gaps of at most `longest` samples in which what bears before and after stays `low`: nothing leaves the
-    ground and lands so soon, but skin that dips through it is seen now by one vertex, now by another."""
+    """Bearing, with gaps of at most `longest` samples closed in which the part stays `low`: no foot leaves and lands so
+    soon, but skin that dips through the ground shows now by one vertex, now by another."""
     without = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(~bears[:, part]), strict=True):
@@ -107,7 +107,7 @@ def _without_gaps(bears: Mask, low: Mask, longest: int) -> Mask:
 
 
 def _dragged(bears: Mask, lies: Mask) -> Mask:
-    """With what `lies` on the ground from one time of bearing, or an end of the shot, to another, however it slides."""
+    """Bearing, with gaps closed, also at the ends of the shot, in which the part stays on the ground and slides."""
     dragged = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         ends = np.pad(bears[:, part], 1, constant_values=True)
@@ -117,7 +117,7 @@ def _dragged(bears: Mask, lies: Mask) -> Mask:
 
 
 def _landed(bears: Mask, height: Array) -> Mask:
-    """Without the samples at which what bears is still coming down, or has begun to go up: it is near, not there."""
+    """Bearing, without samples at which the part is still coming down or has begun to rise."""
     landed = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(bears[:, part]), strict=True):
@@ -130,13 +130,13 @@ def _landed(bears: Mask, height: Array) -> Mask:
 
 
 def without_glimpses(bears: Mask, tracks: PartTracks) -> Mask:
-    """Without the glimpses at an end of the shot of what bears at other times and does not rest there.
+    """Bearing, without brief contacts at the first and last frames, in which the part does not rest.
 
-    Such a foot is about to land, or has just lifted.
+    Such a foot is about to land, or has just lifted. A part that bears only then keeps its contacts.
     """
     longest = max(round(GLIMPSE * tracks.rate), 2)
     seen, rise = bears.copy(), tracks.rise
-    if tracks.loops:  # what goes on beyond the seam is not seen at this end
+    if tracks.loops:  # bearing that goes on beyond the seam is not seen at this end
         rise = rise.copy()
         rise[[0, -1]] = np.abs(tracks.low[[1, -2]] - tracks.low[[0, -1]]) * tracks.rate
     for part in np.flatnonzero(bears.any(axis=0)):

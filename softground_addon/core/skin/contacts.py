@@ -1,4 +1,4 @@
-"""From the skin to its contacts: the ground, what bears on it and when."""
+"""Contacts of the skin: the ground, the parts that bear on it and their times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..numerics.slices import Slices, sliced
 from .bearing import bearing, without_glimpses
 from .footing import footing_of
 from .ground_level import ground_of
-from .merging import merged
+from .merging import merged, moving_alike
 from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
 
 SHORT = 0.2
@@ -20,15 +20,17 @@ RARE = 0.5
 """A contact of less than this share of the busiest one's time is rare."""
 SLIPS = 0.5
 """A contact that slips faster than this share of the fastest slip of its parts brushes."""
+RESTS = 0.05
+"""A contact that slips slower than this share of its fastest slip stands where it is, however seldom: a kick's foot."""
 ALONE = 0.5
-"""What bears alone for this share of its time bears the body."""
+"""Share of its time for which a contact that bears the body bears alone."""
 UNEVEN = 0.0075
 """The ground lies at most this far off the level at which skin is most often, in body heights."""
 
 
 @dataclass(frozen=True)
 class SkinContacts:
-    """What bears of a character, when, and on what.
+    """Contacts of a character: parts, times and ground.
 
     Attributes
     ----------
@@ -41,9 +43,9 @@ class SkinContacts:
     group : (P,) int array
         Contact that each part belongs to, -1 for none.
     bears : (F, C) bool array
-        When each contact bears.
+        True while each contact bears.
     tracks : PartTracks
-        Where each part is lowest.
+        Tracks of each part where it is lowest.
     """
 
     level: float
@@ -73,7 +75,7 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
         assert skin.links is not None, "without them no parts can be told to be one contact"
         parts = yield from track_parts.slices(skin, floor=ground.floor)
         _, bears = ground.borne(parts)
-        groups = merged(parts, bears, skin.links)
+        groups = merged(parts, bears, skin.links, moving_alike(skin), skin.twin)
         groups = _numbered(groups)
         if (groups >= 0).any():
             groups = yield from _without_brushes(skin, groups, ground)
@@ -91,7 +93,7 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
 
 @dataclass(frozen=True)
 class _Ground:
-    """What a character bears on: one level, or where that is unknown (`floor` -inf) as many as its parts rest at."""
+    """Ground of a character: one level, or where that is unknown (`floor` -inf) as many as its parts rest at."""
 
     floor: float
     level: float
@@ -132,7 +134,8 @@ def _without_brushes(skin: SkinMotion, groups: Indices, ground: _Ground) -> Slic
         starts, ends = runs(on)
         alone = (bears[on].sum(axis=1) == 1).mean()
         slips = np.median(slip[on, contact]) > SLIPS * fast[contact]
-        rare = time[contact] < RARE * time.max()
+        rests = np.median(slip[on, contact]) < RESTS * fast[contact]
+        rare = time[contact] < RARE * time.max() and not rests
         lasts = (ends - starts).max() - 1 >= SHORT * skin.rate
         keeps[contact] = lasts or alone >= ALONE or not (slips or rare or not time[twin[contact]].any())
     keeps |= (time > 0) & (twin & keeps).any(axis=1)
@@ -141,12 +144,12 @@ def _without_brushes(skin: SkinMotion, groups: Indices, ground: _Ground) -> Slic
 
 
 def _twin_groups(groups: Indices, twin: Indices | None, count: int) -> Mask:
-    """Which groups mirror which, (count, count); one without a mirror image mirrors itself."""
+    """True for groups that mirror each other, (count, count); one without a mirror image mirrors itself."""
     mirrors = np.zeros((count, count), dtype=bool)
     for number in range(count):
-        own = np.flatnonzero(groups == number)
-        others = own if twin is None else twin[own]
-        sided = others != own
+        members = np.flatnonzero(groups == number)
+        others = members if twin is None else twin[members]
+        sided = others != members
         if sided.mean() > 0.5:  # most of it has a twin
             here = groups[others[sided & (others >= 0)]]
             mirrors[number, here[here >= 0]] = True

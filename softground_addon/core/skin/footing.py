@@ -1,4 +1,4 @@
-"""Where each part stands on ground of several heights: on stairs and slopes, be there a mesh of them or not."""
+"""Height of the ground under each part on stairs and slopes, with a mesh of them or without."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .bearing import LEAST_SLIP, STILL, TOUCH
 from .skin_motion import Array, Mask, PartTracks
 
 TRAVELS = 1.0
-"""Who gets no farther than this stands on one level, in body heights."""
+"""Longest way of a character that stays on one level, in body heights."""
 OFF_LEVEL = 0.02
 """Skin that rests this far off the level rests on another one, in body heights."""
 OFF_SHARE = 0.25
@@ -46,7 +46,7 @@ def footing_of(tracks: PartTracks, level: float) -> Array | None:
 
 
 def _rests(tracks: PartTracks) -> Mask:
-    """When each part stands still in the world for a while, the lowest of the body at some moment of it, (F, P)."""
+    """True while each part rests in the world, and is the lowest of the body at some moment of it, (F, P)."""
     still = (tracks.rise < tracks.calm) & (tracks.slip(np.zeros(2)) < LEAST_SLIP)
     lowest = tracks.low < tracks.lowest[:, None] + TOUCH
     rests = np.zeros_like(still)

@@ -9,7 +9,7 @@ from .bearing import TOUCH
 from .skin_motion import Array, PartTracks
 
 REACH = 0.05
-"""What may rest lies at most this far over the lowest skin, in body heights."""
+"""Largest height of resting skin over the lowest skin, in body heights."""
 BIN = 0.004
 """Step of the levels that are tried, in body heights."""
 OFTEN = 20.0
@@ -17,12 +17,12 @@ OFTEN = 20.0
 AROUND = 0.5
 """Time to either side over which that is looked for [s]: a stride of a run."""
 FURTHER_PART = 0.15
-"""How much a further part that rests at a level adds to a moment's vote for it."""
+"""Addition of a further part that rests at a level to a moment's vote for it."""
 SUNK = 0.08
 """Feet dip through the ground by up to this in cycles as they are sold: skin that rests deeper below a level speaks
 against it, in body heights."""
 AGAINST = 0.35
-"""How much a moment of such rest takes off."""
+"""Deduction for a moment of such rest."""
 AS_LONG = 2 / 3
 """Share of the votes for a level that a part has at a higher one, while nothing rests at the lower, to raise it."""
 SAME_WAY = 0.15
@@ -32,19 +32,20 @@ STANDS = 0.15
 STANDING_SHARE = 0.8
 """A ground that stands wins with this share of the votes of one that moves."""
 GROUNDED_SHARE = 0.8
-"""A velocity among what is low wins with this share of the votes that the ground has with that of all skin."""
+"""A velocity of low skin wins with this share of the votes that the ground has with that of all skin."""
 MOST_VOTES = 500
-"""Moments of parts that are asked at most."""
+"""Most moments of parts that vote."""
 _SLICE = 200_000
-"""Times levels that are asked in one slice."""
+"""Votes, times levels, that are counted in one slice."""
 
 
 @sliced
 def ground_of(tracks: PartTracks) -> Slices[tuple[float, Array]]:
     """Height of the ground [H] and its horizontal velocity, (2,) [H/s].
 
-    Velocity is looked for among what is low for the half second around, as feet that hang in flight are calm, too; and
-    among all low skin, as feet may dip deep through the ground in swing. What more skin rests on is the ground.
+    Velocity is sought among skin that is low for the half second around, as feet that hang in flight are calm, too; and
+    among all low skin, as feet may dip deep through the ground in swing. The ground is the level on which more skin
+    rests.
     """
     drift, other = drift_of(tracks, _on_ground(tracks)), drift_of(tracks)
     level, votes = yield from level_of.slices(tracks, drift)
@@ -56,7 +57,7 @@ def ground_of(tracks: PartTracks) -> Slices[tuple[float, Array]]:
 
 
 def _on_ground(tracks: PartTracks) -> Array:
-    """How near each part is to the lowest calm skin around, (F, P): 1 there, 0 where it is `REACH` over it."""
+    """Nearness of each part to the lowest calm skin around, (F, P): 1 at it, 0 from `REACH` above it on."""
     reach = max(round(AROUND * tracks.rate), 1)
     lowest = np.pad(np.where(_calm(tracks) > 0, tracks.low, np.inf).min(axis=1), reach, mode="symmetric")
     around = np.lib.stride_tricks.sliding_window_view(lowest, 2 * reach + 1)
@@ -67,28 +68,28 @@ def _on_ground(tracks: PartTracks) -> Array:
 def drift_of(tracks: PartTracks, counts: Array | float = 1.0) -> Array:
     """Horizontal velocity that most calm low skin has, (2,) [H/s]: 0 where the character travels.
 
-    The belt's in a walk on the spot, backward: minus the travel that root motion would have. `counts` (F, P) is how
-    much each part counts at each moment.
+    The belt's in a walk on the spot, backward: minus the travel that root motion would have. `counts` (F, P) are the
+    weights of each part at each moment.
     """
     weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH) * counts
     frame, part = np.nonzero(weight)
     if not len(frame):
         return np.zeros(2)
     if len(frame) > MOST_VOTES:
-        some = np.linspace(0, len(frame) - 1, MOST_VOTES).astype(int)
-        frame, part = frame[some], part[some]
+        sampled = np.linspace(0, len(frame) - 1, MOST_VOTES).astype(int)
+        frame, part = frame[sampled], part[sampled]
     ways, weight = tracks.ways.mean(axis=0)[frame, part], weight[frame, part]
     first = np.flatnonzero(np.diff(frame, prepend=-1))
 
     def votes(way: Array) -> Array:
         """Each moment has one vote for a velocity (N, 2), however many parts move with it."""
-        apart = np.hypot(*(np.subtract.outer(one, other) for one, other in zip(way.T, ways.T, strict=True)))
+        apart = np.hypot(*(np.subtract.outer(asked, moving) for asked, moving in zip(way.T, ways.T, strict=True)))
         apart /= _width(way)[:, None]
         return np.asarray(np.maximum.reduceat(weight * np.clip(1 - apart, 0.0, None), first, axis=1).sum(axis=1))
 
-    found = votes(ways)
-    best = ways[int(found.argmax())]
-    if np.linalg.norm(best) < STANDS or votes(np.zeros((1, 2)))[0] >= STANDING_SHARE * found.max():
+    tally = votes(ways)
+    best = ways[int(tally.argmax())]
+    if np.linalg.norm(best) < STANDS or votes(np.zeros((1, 2)))[0] >= STANDING_SHARE * tally.max():
         return np.zeros(2)
     alike = weight * np.clip(1 - np.linalg.norm(ways - best, axis=-1) / _width(best), 0.0, None)
     return np.asarray((ways * alike[:, None]).sum(axis=0) / alike.sum())
@@ -102,8 +103,8 @@ def _width(way: Array) -> Array:
 def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
     """Height of the ground [H], where calm skin that moves with the ground is most often, and the votes for it.
 
-    Of feet that land alone at different heights, the highest tells it, whichever is seen in more frames: what sinks
-    below it prints, what hovers over it never does.
+    Of feet that land alone at different heights, the highest counts, whichever is seen in more frames: a foot that
+    sinks below it prints, one that hovers over it never does.
     """
     lowest = tracks.lowest
     speed = max(float(np.linalg.norm(drift)), 1.0)
@@ -127,16 +128,16 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
     return float((tracks.low * here).sum() / here.sum()) if here.any() else best, float(score.max())
 
 
-def _raised(level: float, own: Array, tracks: PartTracks, weight: Array) -> float:
-    """A level [H], or the highest of those that each part has of its `own` (P,) where it rests alone about as long."""
+def _raised(level: float, of_part: Array, tracks: PartTracks, weight: Array) -> float:
+    """A level [H], or the highest of the levels of single parts (P,) where these rest alone about as long."""
     resting = (_at(level, tracks) * weight).max(axis=1)
-    alone = (_at(own, tracks) * weight)[resting == 0].sum(axis=0)
-    raises = (own > level + TOUCH) & (own < level + SUNK) & (alone > AS_LONG * resting.sum())
-    return float(own[raises].max(initial=level))
+    alone = (_at(of_part, tracks) * weight)[resting == 0].sum(axis=0)
+    raises = (of_part > level + TOUCH) & (of_part < level + SUNK) & (alone > AS_LONG * resting.sum())
+    return float(of_part[raises].max(initial=level))
 
 
 def _at(level: Array | float, tracks: PartTracks) -> Array:
-    """How much each part is at a level [H], (F, P) or (L, F, P)."""
+    """Membership of each part in a level [H], (F, P) or (L, F, P)."""
     return np.clip(1.5 - np.abs(tracks.low - level) / BIN, 0.0, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""The deformed skin of a character over time, and what each part of it does where it is lowest."""
+"""The deformed skin of a character over time, and the movement of each part where it is lowest."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 PATCH = 0.008
-"""What lies this near above the lowest point of a part moves with it as one patch, in body heights."""
+"""Height of the lowest patch of a part above its lowest point, in body heights."""
 
 CALM_SPEED = 0.15
 """Skin that rises or falls slower than this may rest, in body heights per second."""
 
 CALM_SHARE = 0.12
-"""The same as a share of how fast low parts move: on tiptoe in a sprint nothing is quite still."""
+"""The same as a share of the speed of low parts: on tiptoe in a sprint nothing is quite still."""
 
 BURIED = 0.015
 """Skin deeper than this below the ground is in it, not on it, in body heights."""
@@ -50,9 +50,11 @@ class SkinMotion:
     rate : float
         Samples per second [Hz].
     height : float
-        The median vertical extent of the body [m], H: lengths are told in it.
+        The median vertical extent of the body [m], H, the unit of lengths.
     twin : (P,) int array, optional
         The part that mirrors each, itself where none does, and -1 where that is not followed.
+    beside : (P, P) bool array, optional
+        Which parts lie against each other as the body was modelled.
     """
 
     positions: NDArray[np.floating]
@@ -61,11 +63,12 @@ class SkinMotion:
     rate: float
     height: float
     twin: Indices | None = None
+    beside: Mask | None = None
 
 
 @dataclass(frozen=True)
 class PartTracks:
-    """Where each part is lowest and how it moves there; lengths in body heights H, speeds in H/s.
+    """Place and movement of each part where it is lowest; lengths in body heights H, speeds in H/s.
 
     Attributes
     ----------
@@ -82,7 +85,7 @@ class PartTracks:
     rate : float
         [Hz]
     loops : bool
-        Whether the shot is one turn of a loop: what bears at its end goes on at its beginning.
+        True if the shot is one turn of a loop: bearing at its end goes on at its beginning.
     """
 
     low: Array
@@ -126,7 +129,7 @@ class PartTracks:
 
 @sliced
 def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -np.inf) -> Slices[PartTracks]:
-    """What the lowest patch of each part does.
+    """Tracks of the lowest patch of each part.
 
     Parameters
     ----------
@@ -134,7 +137,7 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     group : (P,) int array, optional
         Number of the group that each part is in, to track groups in place of parts; -1 for none.
     floor : float
-        Height of the ground [H]: of a part that dips below it, what counts is where its skin meets the ground.
+        Height of the ground [H]: of a part that dips below it, the skin that meets the ground counts.
     """
     part = skin.part if group is None else group[skin.part]
     used = np.flatnonzero(part >= 0)

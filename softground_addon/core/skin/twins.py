@@ -31,22 +31,22 @@ def twins(points: Array, part: Indices, count: int) -> Indices:
     count : int
         Number of parts.
     """
-    best = own = np.arange(count)
+    best = itself = np.arange(count)
     mirrored = 0.0
     size = np.bincount(part, minlength=count)
     middle = np.stack([np.bincount(part, along, count) for along in points.T], axis=-1) / np.maximum(size, 1)[:, None]
     most = np.maximum.outer(size, size)
     unlike = (np.abs(np.subtract.outer(size, size)) > AS_MANY * most) | (most == 0)
-    one, other = np.nonzero(np.triu(~unlike, 1))
-    largest = np.argsort(-size[one], kind="stable")[:MOST_MIRRORS]
+    part_a, part_b = np.nonzero(np.triu(~unlike, 1))
+    largest = np.argsort(-size[part_a], kind="stable")[:MOST_MIRRORS]
     near = BESIDE * np.ptp(points, axis=0).max()
-    for first, second in zip(one[largest], other[largest], strict=True):
+    for first, second in zip(part_a[largest], part_b[largest], strict=True):
         across = unit(middle[second] - middle[first])
         off = (middle - (middle[first] + middle[second]) / 2) @ across
         gap = np.linalg.norm((middle - 2 * np.outer(off, across))[:, None] - middle, axis=-1)
         gap[unlike] = np.inf
         twin = gap.argmin(axis=1)
-        fit = np.clip(1 - gap.min(axis=1) / near, 0.0, None) * (twin[twin] == own)  # in the mirror lies its own image
+        fit = np.clip(1 - gap.min(axis=1) / near, 0.0, None) * (twin[twin] == itself)  # its image's image is itself
         if fit @ size > mirrored:
-            best, mirrored = np.where(fit > 0, twin, own), fit @ size
+            best, mirrored = np.where(fit > 0, twin, itself), fit @ size
     return best

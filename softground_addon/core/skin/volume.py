@@ -1,8 +1,8 @@
-"""How much room a body takes up, from its skin, cut in slices: it may have holes, layers and parts within parts.
+"""Volume of a body from its skin, cut in slices: it may have holes, layers and parts within parts.
 
-A curve that the skin leaves in a slice encloses an area. Where it is closed and its faces agree on what is inside, that
-area is exact; else the curve has gaps, and its convex hull stands for it. Curves within others are what is worn or lies
-inside, and count once. A curve that encloses next to nothing, such as that of a cape, has no area.
+The skin cuts a slice in curves that enclose areas. The area of a closed curve whose faces agree on the inside is exact;
+other curves have gaps, and their convex hulls stand for them. Curves within others are clothes or lie inside, and count
+once. A curve that encloses next to nothing, such as that of a cape, has no area.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ def welded(points: Array) -> Indices:
 
 @dataclass(frozen=True)
 class Pieces:
-    """What each triangle belongs to.
+    """Kind of the piece that each triangle belongs to.
 
     Attributes
     ----------
     is_sheet : (T,) bool array
-        To an open or a thin sheet, such as a cape, a hat or hair.
+        True of an open or a thin sheet, such as a cape, a hat or hair.
     is_cloth : (T,) bool array
-        To a sheet, or to what has wide openings, such as a shirt: if there is skin within, that is the body.
+        True of a sheet or a piece with wide openings, such as a shirt: if there is skin within, that is the body.
     """
 
     is_sheet: Mask
@@ -66,14 +66,14 @@ class Pieces:
 
 
 def pieces(points: Array, triangles: Indices) -> Pieces:
-    """Tell sheets and clothes from bodies, by what hangs together.
+    """Distinguish sheets and clothes from bodies, by connected pieces.
 
     Parameters
     ----------
     points : (V, 3) float array
         [m]
     triangles : (T, 3) int array
-        Those at one place are one where `welded` says so.
+        Vertices at one place are one where `welded` merges them.
     """
     ends = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]).T
     piece = components(len(points), *ends)[triangles[:, 0]]
@@ -108,7 +108,7 @@ def body_volume(points: Array, triangles: Indices) -> Slices[float]:
     points : (V, 3) float array
         [m]
     triangles : (T, 3) int array
-        Those at one place are one where `welded` says so.
+        Vertices at one place are one where `welded` merges them.
     """
     if not len(triangles):
         return 0.0
@@ -149,14 +149,14 @@ def _volume_along(points: Array, triangles: Indices, known: Pieces) -> tuple[flo
     area = np.where(closed, encloses, np.where(is_round, hull, 0.0))
     area = np.where(closed & (encloses < NOTHING * hull) & (length > TWICE * around), hull, area)
     cloth, slices = known.is_cloth[of_curve], _by_slice(cut.slice[order[first]], area)
-    total = sum(_united(support[some], area[some], around[some], cloth[some]) for some in slices)
+    total = sum(_united(support[curves], area[curves], around[curves], cloth[curves]) for curves in slices)
     return float(total) * spacing, float(length[closed].sum() / max(length.sum(), 1e-300))
 
 
 @dataclass(frozen=True)
 class _Cut:
-    """What a skin leaves in its slices: points (N, 2), the slice of each (N,), segments between them and the triangle
-    of each (S,)."""
+    """Curves of a skin in its slices: points (N, 2), the slice of each (N,), segments between them and the triangle of
+    each (S,)."""
 
     points: Array
     slice: Indices
@@ -182,9 +182,9 @@ def _cut(points: Array, level: Array, triangles: Indices) -> _Cut:
         [(plane * count + np.minimum(at, to)) * count + np.maximum(at, to) for to in ends]
     )  # a crossing belongs to an edge, so that neighbours share it
     keys, node = np.unique(keys, return_inverse=True)
-    plane, (one, other) = keys // count**2, np.divmod(keys % count**2, count)
-    share = (plane - level[one]) / (level[other] - level[one])
-    crossing = points[one, :2] + share[:, None] * (points[other, :2] - points[one, :2])
+    plane, (tail, head) = keys // count**2, np.divmod(keys % count**2, count)
+    share = (plane - level[tail]) / (level[head] - level[tail])
+    crossing = points[tail, :2] + share[:, None] * (points[head, :2] - points[tail, :2])
     start, end = np.split(node.ravel(), 2)
     return _Cut(crossing - points[:, :2].mean(axis=0), plane, start, end, which)
 
@@ -201,12 +201,12 @@ def _by_slice(number: Indices, area: Array) -> list[Indices]:
     """Curves of each slice, the largest first, without those that enclose nothing."""
     order = np.lexsort((-area, number))
     order = order[area[order] > 0]
-    return [some[:MOST_CURVES] for some in np.split(order, np.flatnonzero(np.diff(number[order])) + 1)]
+    return [curves[:MOST_CURVES] for curves in np.split(order, np.flatnonzero(np.diff(number[order])) + 1)]
 
 
 def _united(support: Array, area: Array, around: Array, cloth: Mask) -> float:
     """Area of curves, the largest first, without those within a larger one and without cloth around skin."""
     sticks_out = (support[None] - support[:, None]).max(axis=2)
     within = np.triu(sticks_out <= WITHIN * around[:, None] / (2 * np.pi), 1)
-    kept = ~(within & cloth[:, None] & ~cloth).any(axis=1)
-    return float(area[kept & ~(within & kept[:, None]).any(axis=0)].sum())
+    visible = ~(within & cloth[:, None] & ~cloth).any(axis=1)
+    return float(area[visible & ~(within & visible[:, None]).any(axis=0)].sum())

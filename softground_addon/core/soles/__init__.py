@@ -1,1 +1,1 @@
-"""What prints: undersides, outlines, how a foot lies, the pieces of a sole."""
+"""Soles that print: undersides, outlines, the attitude of a foot, the pieces of a sole."""

@@ -1,4 +1,4 @@
-"""How a foot lies when it stands: the sole's flat attitude, found in the motion itself.
+"""Attitude of a standing foot: the sole's flat attitude, found in the motion itself.
 
 The rest pose of a rig need not have flat feet, so the attitude is taken at the instants at which the foot is planted:
 low and still. Their median is robust against the few that are misjudged.
@@ -22,7 +22,7 @@ _STILL_SPEED = 0.05
 """A foot slower than this, over sqrt(g·leg length), is still (0.15 m/s for a man)."""
 
 _STILL_SHARE = 0.2
-"""Of feet that never are still, the slowest part of their low instants counts, and at least `_FEWEST_INSTANTS`."""
+"""Slowest part of the low instants that counts for feet that never are still, at least `_FEWEST_INSTANTS`."""
 
 _LOW_CLEARANCE = 0.05
 """Height above the foot's own lowest position within `_FLOOR_WINDOW`, over leg length, up to which a foot is low."""
@@ -45,7 +45,7 @@ _ANKLE_HEIGHTS = (0.12, 0.55)
 """Heights of the ankle over foot length that a foot can have; outside, the bones do not reach the ground."""
 
 _LEAST_FOOT = 0.3
-"""Foot length over the one that fits the leg, below which the bones are stubs that tell nothing."""
+"""Foot length over the one that fits the leg, below which the bones are stubs of no use."""
 
 _TIP_TRUST = (0.8, 1.3)
 """Foot length from the toe tip over that from the ball, within which the tip is where the toes end; tips of leaf
@@ -53,14 +53,14 @@ bones are often made up by importers."""
 
 
 _TIP_POINTS = (0.7, 1.3)
-"""The same within which the tip tells where the foot points: the last marker of a capture is on the toes, not before
+"""The same within which the tip shows where the foot points: the last marker of a capture is on the toes, not before
 them."""
 
 
 def planted_instants(
     feet: Sequence[Array], *, frame_rate: float, leg_length: float, gravity: float = 9.81
 ) -> list[NDArray[np.bool_]]:
-    """When each foot is planted.
+    """Instants at which each foot is planted.
 
     Parameters
     ----------
@@ -167,12 +167,12 @@ class FlatFoot:
     ball: float
 
 
-def standing_up(own: Array, others: Sequence[Array] = (), *, trust_rest_within: float = 0.0) -> Array:
+def standing_up(turns: Array, others: Sequence[Array] = (), *, trust_rest_within: float = 0.0) -> Array:
     """World up as a standing foot's bone has it in the rest pose.
 
     Parameters
     ----------
-    own : (K, 3, 3) float array
+    turns : (K, 3, 3) float array
         Rotations of the bone from the rest pose to each planted instant.
     others : sequence of (K, 3, 3) float arrays
         The same of feet that are this one's mirror image, reflected; used where they do not contradict.
@@ -182,9 +182,9 @@ def standing_up(own: Array, others: Sequence[Array] = (), *, trust_rest_within: 
     Returns
     -------
     (3,) float array
-        Unit vector; the rest pose's own up where the motion does not tell.
+        Unit vector; the rest pose's own up where the motion does not show it.
     """
-    samples = own[:, 2, :]
+    samples = turns[:, 2, :]
     up = typical_direction(samples)
     for other in others:
         image = typical_direction(other[:, 2, :])
@@ -245,7 +245,7 @@ class FootSize:
 
 
 def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: float) -> FootSize:
-    """Size of a foot from what its bones tell.
+    """Size of a foot by its bones.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: floa
 
 
 def ends_in_toes(ankle: Array, ball: Array, tip: Array, up: Array) -> bool:
-    """Whether the last bone of a foot ends about where the toes of a foot with that ankle and ball do.
+    """True if the last bone of a foot ends about where the toes of a foot with that ankle and ball do.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def ends_in_toes(ankle: Array, ball: Array, tip: Array, up: Array) -> bool:
 
 
 def _foot_length(ankle_to_ball: float | None, ankle_to_tip: float, leg: float) -> float:
-    """Foot length from distances along the flat sole; where they say nothing, from the length of the leg."""
+    """Foot length from distances along the flat sole; without any, from the length of the leg."""
     expected = FOOT_TO_LEG * leg
     from_tip = ankle_to_tip / (1 - ANKLE_POSITION)
     tip_as_ball = ankle_to_tip / (BALL_POSITION - ANKLE_POSITION)

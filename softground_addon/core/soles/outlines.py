@@ -81,12 +81,12 @@ def trace_loops(coverage: Array, origin: Array, spacing: float) -> list[Array]:
 
 
 def _edge_points(field: Array, edges: NDArray[np.intp]) -> Array:
-    """Where the zero level crosses the given grid edges, as (x, y) in nodes; even edges run along x, odd along y."""
+    """Crossings of the zero level and the given grid edges, as (x, y) in nodes; even edges run along x, odd along y."""
     node, along_y = np.divmod(edges, 2)
     row, column = np.divmod(node, field.shape[1])
-    here = field[row, column]
-    there = field[row + along_y, column + 1 - along_y]
-    fraction = here / (here - there)
+    start = field[row, column]
+    end = field[row + along_y, column + 1 - along_y]
+    fraction = start / (start - end)
     return np.column_stack([column + fraction * (1 - along_y), row + fraction * along_y])
 
 
@@ -147,9 +147,9 @@ def as_one_polygon(loops: Sequence[Array]) -> Array:
     joined = loops[0]
     for loop in loops[1:]:
         gaps = np.linalg.norm(joined[:, None] - loop, axis=-1)
-        here, there = np.unravel_index(int(gaps.argmin()), gaps.shape)
-        ring = np.roll(loop, -there, axis=0)
-        joined = np.concatenate([joined[: here + 1], ring, ring[:1], joined[here:]])
+        leave, enter = np.unravel_index(int(gaps.argmin()), gaps.shape)
+        ring = np.roll(loop, -enter, axis=0)
+        joined = np.concatenate([joined[: leave + 1], ring, ring[:1], joined[leave:]])
     return joined
 
 
@@ -160,12 +160,12 @@ def convex_hull(points: Array) -> Array:
         return ordered
 
     def chain(places: Array) -> list[Array]:
-        kept: list[Array] = []
+        corners: list[Array] = []
         for place in places:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], place) <= 0:
-                kept.pop()
-            kept.append(place)
-        return kept[:-1]
+            while len(corners) > 1 and _turn(corners[-2], corners[-1], place) <= 0:
+                corners.pop()
+            corners.append(place)
+        return corners[:-1]
 
     return np.array(chain(ordered) + chain(ordered[::-1]))
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import SolePatch
+from ..motion.sole_motion import SolePatch
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-"""What is said of many cells at many steps: fractions and heights near the ground, where 32 bits are plenty."""
+"""Values of many cells at many steps: fractions and heights near the ground, where 32 bits are plenty."""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where places lie between the nodes of a patch's maps."""
+    """Position of places between the nodes of a patch's maps."""
 
     index: NDArray[np.intp]
     u: Single
@@ -26,7 +26,7 @@ class Nodes:
 
     @classmethod
     def under(cls, patch: SolePatch, x: Single, y: Single) -> Nodes:
-        """Under places in the patch's frame [m]; of those beyond the maps, under the nearest place on them."""
+        """Nodes under places in the patch's frame [m]; beyond the maps, those under the nearest place on them."""
         rows, columns = patch.heights.shape
         u, v = (
             _before_last((along - np.float32(start)) * np.float32(1 / patch.spacing), count)
@@ -63,7 +63,7 @@ def _before_last(along: Single, count: int) -> Single:
 
 
 def distance_beyond(patch: SolePatch, x: Single, y: Single) -> Single:
-    """How far places in a patch's frame lie beyond its maps [m]."""
+    """Distance of places in a patch's frame beyond its maps [m]."""
     last = patch.origin + (np.array(patch.heights.shape[::-1]) - 1) * patch.spacing
     beyond = [
         np.maximum(np.maximum(low - along, along - high), np.float32(0))

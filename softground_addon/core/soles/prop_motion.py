@@ -1,4 +1,4 @@
-"""A rigid object that prints with its own surface, by whatever of it faces down, over time."""
+"""A rigid object that prints with the surface that faces down, over time."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..motion.motion import Array, SoleMotion
+from ..motion.motion import Array
 from ..motion.props import mass_properties
+from ..motion.sole_motion import SoleMotion
 from ..numerics.rigid import displacement, nearest_rotation
 from .soles import prop_sole
 
@@ -33,7 +34,7 @@ def prop_motion(
     matrices : (F, 4, 4) float array
         That frame to the world over time [m].
     owner : str
-        What the user calls the object.
+        The user's name of the object.
     name, side : str
         As in `Sole`.
 

@@ -1,4 +1,4 @@
-"""Soles: what a foot or an object turns toward the ground, from its mesh or from the proportions of a human foot.
+"""Soles: the undersides of feet and objects, from their meshes or from the proportions of a human foot.
 
 Everything is built in the *sole frame*: x toward the toes, y left, z up, as the sole lies flat on the ground.
 """
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..motion.motion import Array, Sole, SolePatch
+from ..motion.motion import Array
 from ..motion.props import Prop, supports
+from ..motion.sole_motion import Sole, SolePatch
 from ..numerics.bilinear import sample_map
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
@@ -46,8 +47,8 @@ _SEAM = 0.06
 """Overlap of foot and toes over sole length, so that bent toes leave no gap under the ball."""
 
 _BEND = 0.3
-"""How far behind and before the ball the skin of a bare foot moves with both foot and toes, over sole length: feet that
-roll slide least on the captured motions with this."""
+"""Distance behind and before the ball in which the skin of a bare foot moves with both foot and toes, over sole length:
+feet that roll slide least on the captured motions with this."""
 
 _WIDEST_BEND = 0.5
 """The most of it that is looked for in a skin."""
@@ -161,7 +162,7 @@ def sole_from_underside(
     ball : float, optional
         x of the line about which the toes bend [m]; none gives a sole of one piece.
     toe_weight : (V,) float array, optional
-        How much of each vertex moves with the toes.
+        Share of each vertex that moves with the toes.
 
     Returns
     -------
@@ -208,16 +209,16 @@ def sole_from_underside(
 
 
 def _bend(vertices: Array, toe_weight: Array, ball: float) -> float:
-    """How far behind and before the ball the underside's weights go from foot to toes [m]: least squares, straight.
+    """Distance behind and before the ball in which the underside's weights go from foot to toes [m], by least squares.
 
-    None for a crease that is no wider than the seam of the pieces.
+    0 for a crease that is no wider than the seam of the pieces.
     """
     length = float(np.ptp(vertices[:, 0]))
     low = vertices[:, 2] < vertices[:, 2].min() + _UNDERSIDE_BAND * length
     tried = np.linspace(0.0, _WIDEST_BEND, 51)[1:] * length
     ramp = np.clip(0.5 + (vertices[low, 0] - ball) / (2 * tried[:, None]), 0.0, 1.0)
-    found = float(tried[((ramp - toe_weight[low]) ** 2).sum(axis=1).argmin()])
-    return found if found > _SEAM * length / 2 + 1e-9 else 0.0
+    bend = float(tried[((ramp - toe_weight[low]) ** 2).sum(axis=1).argmin()])
+    return bend if bend > _SEAM * length / 2 + 1e-9 else 0.0
 
 
 def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "", give: float = 0.0) -> Sole:
@@ -231,7 +232,7 @@ def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: 
     name, side : str
         As in `Sole`.
     give : float
-        How far its surface itself gives way, over its size; see `props.Prop`.
+        Compression of its own surface, over its size; see `props.Prop`.
 
     Raises
     ------

@@ -31,7 +31,7 @@ def underside_map(
     *,
     band: float = np.inf,
 ) -> tuple[Array, Array]:
-    """Height of the lowest surface over each node of a grid, and how much of the node's cell it covers.
+    """Height of the lowest surface over each node of a grid, and the share of the node's cell that it covers.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ import pytest
 
 from softground_addon.core.capture import amass
 from softground_addon.core.errors import InputError
+from tests.core.capture.memory import taking_no_more_than
 
 UPRIGHT = (np.pi / 2, 0.0, 0.0)
 """Turns a body with y up to z up, as all AMASS files do."""
@@ -17,6 +18,12 @@ UPRIGHT = (np.pi / 2, 0.0, 0.0)
 def archive(**arrays: object) -> bytes:
     content = io.BytesIO()
     np.savez(content, **arrays)
+    return content.getvalue()
+
+
+def packed(**arrays: object) -> bytes:
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays)
     return content.getvalue()
 
 
@@ -62,9 +69,17 @@ def test_a_knee_bends_by_its_turn():
         (archive(poses=poses()[:, :30], trans=np.zeros((3, 3)), mocap_framerate=60), "66 or more"),
         (archive(poses=np.array([{}], object), trans=np.zeros((3, 3)), mocap_framerate=60), "not an AMASS file"),
         (archive(poses=poses(), trans=np.zeros((3, 3)), mocap_framerate=60)[:-300], "not an AMASS file"),
+        (archive(poses=poses(), trans=np.zeros((3, 3)), mocap_framerate=1e-9), "frame rate of 1e-09 Hz"),
+        (archive(poses=poses(), trans=np.zeros((3, 3)), mocap_framerate=1e5), "frame rate of 100000 Hz"),
+        (packed(poses=np.zeros((10**6, 66), np.int8), trans=np.zeros((3, 3)), mocap_framerate=60), "1,000,000 frames"),
+        (packed(poses=poses(), trans=np.zeros((10**7, 3), np.int8), mocap_framerate=60), "10,000,000 frames"),
+        (archive(poses=poses(), trans=np.zeros(3), mocap_framerate=60), "not an AMASS file"),
     ],
-    ids=["text", "no poses", "no rate", "lengths", "few joints", "objects", "cut short"],
-)
-def test_a_broken_archive_is_refused_in_a_sentence(content, words):
-    with pytest.raises(InputError, match=words):
+    ids=[
+        "text", "no poses", "no rate", "lengths", "few joints", "objects", "cut short", "slow", "fast", "long",
+        "long way", "no way",
+    ],
+)  # fmt: skip
+def test_a_broken_archive_is_refused_in_a_sentence_before_it_takes_memory(content, words):
+    with taking_no_more_than(100e6), pytest.raises(InputError, match=words):
         amass.read(content)

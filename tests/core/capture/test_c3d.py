@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from softground_addon.core.capture import c3d
 from softground_addon.core.errors import InputError
 from tests.core.capture.c3d_files import DEC, INTEL, SGI, c3d_file
+from tests.core.capture.free_moments import free_moment
+from tests.core.capture.memory import taking_no_more_than
 
 FRAMES, SAMPLES = 20, 10
 CORNERS = np.array([[600.0, 400, 0], [0, 400, 0], [0, 0, 0], [600, 0, 0]])
@@ -60,7 +62,7 @@ def test_markers_and_plates_are_those_of_ezc3d(tmp_path, processor, scale, kind)
     np.testing.assert_allclose(ours.force, platform["force"].T, atol=1e-9)
     np.testing.assert_allclose(ours.moment * 1e3, platform["moment"].T, atol=1e-6)
     np.testing.assert_allclose(ours.centre_of_pressure() * 1e3, platform["center_of_pressure"].T, atol=1e-6)
-    np.testing.assert_allclose(ours.free_moment() * 1e3, platform["Tz"].T[:, 2], atol=1e-6)
+    np.testing.assert_allclose(free_moment(ours) * 1e3, platform["Tz"].T[:, 2], atol=1e-6)
 
 
 @pytest.mark.parametrize("processor", [INTEL, DEC, SGI])
@@ -78,7 +80,7 @@ def test_a_plate_that_sends_its_centre_of_pressure_has_it():
     capture = c3d.read(c3d_file(points(), 100.0, analog=values, samples=SAMPLES, plates=plate(1)))
     (ours,) = capture.plates
     np.testing.assert_allclose(ours.centre_of_pressure()[0], [0.33, 0.24, 0], atol=1e-9)
-    np.testing.assert_allclose(ours.free_moment()[0], 0.5, atol=1e-9)
+    np.testing.assert_allclose(free_moment(ours)[0], 0.5, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -89,13 +91,27 @@ def test_a_plate_that_sends_its_centre_of_pressure_has_it():
         (c3d_file(points(), 100.0)[:-600], "cut short"),
         (c3d_file(points(), 100.0).replace(b"mm", b"ft"), "unit of length"),
         (c3d_file(points(), 0.0), "frame rate"),
+        (c3d_file(points(), 1e-9), "frame rate"),
         (c3d_file(np.zeros((0, 3, 3)), 100.0), "cut short|no markers"),
     ],
-    ids=["empty", "another format", "cut short", "feet", "no rate", "no frames"],
+    ids=["empty", "another format", "cut short", "feet", "no rate", "low rate", "no frames"],
 )
 def test_what_cannot_be_read_is_refused_in_a_sentence(content, words):
     with pytest.raises(InputError, match=words):
         c3d.read(content)
+
+
+def test_more_frames_than_a_rig_takes_are_refused_before_they_take_memory():
+    field = {"ACTUAL_START_FIELD": np.array([1, 0]), "ACTUAL_END_FIELD": np.array([150_001 % 65536, 150_001 // 65536])}
+    content = c3d_file(np.zeros((150_001, 1, 3)), 100.0, scale=0.1, more={"TRIAL": field})
+    with taking_no_more_than(5e6), pytest.raises(InputError, match="150,001 frames, over 100,000"):
+        c3d.read(content)
+
+
+def test_plates_that_claim_the_same_channels_take_no_more_memory_than_the_channels():
+    claimed = {name: np.repeat(value, 200, axis=-1) for name, value in plate(2).items() if name not in ("USED", "ZERO")}
+    content = c3d_file(points(), 100.0, analog=signals(2), samples=SAMPLES, plates=claimed | {"USED": np.array([200])})
+    assert len(c3d.read(content).plates) == 1
 
 
 @given(seed=st.integers(0, 2**32 - 1), where=st.integers(0, 5000), length=st.integers(1, 40))

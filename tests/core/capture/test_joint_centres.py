@@ -9,6 +9,8 @@ from softground_addon.core.capture import trc
 from softground_addon.core.capture.captured import Capture, Plate
 from softground_addon.core.capture.joint_centres import UPWARD, captured_body
 from softground_addon.core.errors import InputError
+from tests.core.capture.free_moments import free_moment
+from tests.core.capture.memory import taking_no_more_than
 
 FRAMES = 30
 JOINTS = {
@@ -108,7 +110,7 @@ def test_plates_push_up_whatever_sign_their_maker_writes(sign):
     (plate,) = captured_body(capture(centres(), (Plate(corners, 100.0, sign * force, sign * moment),))).plates
     np.testing.assert_allclose(plate.force, force)
     np.testing.assert_allclose(plate.centre_of_pressure()[0], (0.4, 0.15, 0), atol=1e-12)
-    np.testing.assert_allclose(plate.free_moment(), 3.0, atol=1e-12)
+    np.testing.assert_allclose(free_moment(plate), 3.0, atol=1e-12)
 
 
 def test_without_legs_it_says_which_markers_are_missing():
@@ -144,11 +146,20 @@ def test_a_trc_file_holds_the_same_body():
         (b"", "no TRC file"),
         (b"HIERARCHY\n" * 9, "no TRC file"),
         (trc_file(centres(), frames=99), "30 of 99 frames"),
-        (trc_file(centres()).replace(b"DataRate", b"Rate"), "data rate"),
+        (trc_file(centres()).replace(b"DataRate", b"Rate"), "frame rate"),
+        (trc_file(centres()).replace(b"100.00\t100", b"1e-300\t100"), "frame rate of 1e-300 Hz"),
+        (trc_file(centres()) + b"1\n" * 100_000, "100,030 frames, over 100,000"),
+        (trc_file({f"m{index}": np.zeros((1, 3)) for index in range(20_000)}, frames=1) + b"1\n" * 20_000, "far fewer"),
         (trc_file(centres()).replace(b"\tmm", b"\tfeet"), "unit of length"),
     ],
-    ids=["empty", "another format", "cut short", "no rate", "feet"],
+    ids=["empty", "another format", "cut short", "no rate", "low rate", "long", "sparse", "feet"],
 )
-def test_a_broken_trc_file_is_refused_in_a_sentence(content, words):
-    with pytest.raises(InputError, match=words):
+def test_a_broken_trc_file_is_refused_in_a_sentence_before_it_takes_memory(content, words):
+    with taking_no_more_than(20e6), pytest.raises(InputError, match=words):
         trc.read(content)
+
+
+@pytest.mark.parametrize("count", ["²", "9" * 5000, "many"])
+def test_a_count_of_frames_that_is_none_is_passed_over(count):
+    content = trc_file(centres()).replace(b"\t30\t", f"\t{count}\t".encode())
+    assert len(trc.read(content).points) == FRAMES

@@ -338,7 +338,7 @@ def test_a_print_of_which_too_little_is_kept_can_only_be_muted():
     _, left = baked()
     old = replace(left, footprints=[replace(footprint, pressed_by=None) for footprint in left.footprints])
     assert edited(old, {1: StepEdit(mute=True)}).pressed_again == {1: None}
-    with pytest.raises(InputError, match=r"foot.R, at frame 21 .*can only be muted: bake again"):
+    with pytest.raises(InputError, match=r"foot.R, at frame 21 .*can only be muted: give it fewer"):
         edited(old, {1: StepEdit(strength=0.5)})
 
 

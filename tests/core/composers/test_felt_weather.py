@@ -6,24 +6,26 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from softground_addon.core.after import weather as w
-from softground_addon.core.after.felt_weather import FeltWeather, PrintsInWeather, weathering_of
-from softground_addon.core.after.weather import PARTS, Span
-from softground_addon.core.after.weather_course import course_of
-from softground_addon.core.after.weather_places import section_of, weather_places
 from softground_addon.core.composers.edited_steps import EditedSteps, with_edits
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.display_blur import blurred_window
-from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, SparseGrid, Window
+from softground_addon.core.ground.heightfield import FlatTerrain, HeightField
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.ground.sparse_grid import SparseGrid, Window
+from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.motion.motion import steps_per_frame
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
-from tests.core.after.weathered_ground import weathered
+from softground_addon.core.weather import weather as w
+from softground_addon.core.weather.felt_weather import FeltWeather, PrintsInWeather, weathering_of
+from softground_addon.core.weather.weather import PARTS, Span
+from softground_addon.core.weather.weather_course import course_of
+from softground_addon.core.weather.weather_places import section_of, weather_places
 from tests.core.walkers import box_sole, loads_of, pose, walk
+from tests.core.weather.weathered_ground import weathered
 
 RATE, CELL, LAYER = 24.0, 0.02, 0.4
 MATERIAL = GroundMaterial(60e3, 0.1, 0.05, layer_depth=LAYER)
@@ -157,8 +159,8 @@ def test_sand_blown_into_a_print_is_pressed_down_again(part):
     weather = replace(between(wind=8.0, time_scale=600.0), surface="sand")
     first, second = prints(weather, second=part)
     section = first.compressed_m3 / np.sqrt(first.area_m2)
-    flux = w.blown_flux(8.0, w.SAND)
-    kept = float(np.exp(-w.fill_rate(flux, section, w.SAND) * 600.0 * SECONDS))
+    flux = w.blown_flux(8.0, SURFACES["sand"].drifts_from)
+    kept = float(np.exp(-w.fill_rate(flux, section, SURFACES["sand"].density) * 600.0 * SECONDS))
     assert 0.5 < kept < 0.9
     assert middle([first, second]) == pytest.approx(DEPTH * max(kept, part), rel=2e-3)
 
@@ -189,7 +191,9 @@ def test_wind_takes_of_a_print_what_it_fills_and_no_more():
     trodden.write(WHERE, made[:1] > 0)
     known = {"trodden": trodden, "pressed": made[0], "frame": 145.0, "section": 0.05}
     left = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
-    kept = np.exp(-w.fill_rate(w.blown_flux(8.0, w.SAND), 0.05, w.SAND) * 600.0 * SECONDS)
+    kept = np.exp(
+        -w.fill_rate(w.blown_flux(8.0, SURFACES["sand"].drifts_from), 0.05, SURFACES["sand"].density) * 600.0 * SECONDS
+    )
     assert left.sum(axis=(1, 2)) == pytest.approx(kept * made.sum(axis=(1, 2)), rel=1e-4)
     assert np.array_equal(in_weather.aged(ground, WHERE, since=np.full((80, 80), 145.0), **known), made)
 
@@ -264,14 +268,14 @@ def test_a_step_that_hardly_presses_leaves_what_was_seen_before_it(surface, rate
 
 
 ALL_AT_ONCE = {"snowfall": 0.03 / SECONDS, "temperature": 1.0, "wind": 8.0, "rain": 0.01 / SECONDS}
-SURFACES = ["snow", "sand", "soil"]
+FELT = ["snow", "sand", "soil"]
 
 
 def ground_in(weather):
     return SoftGround(FlatTerrain(), MATERIAL, weathering=weathering_of(weather, LAYER))
 
 
-@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize("surface", FELT)
 @pytest.mark.parametrize(
     ("edit", "as_if"),
     [

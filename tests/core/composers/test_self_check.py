@@ -1,14 +1,18 @@
 """What a bake says of itself, on cases that are right or wrong by construction."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.self_check import WALK_RATIO, self_check
+from softground_addon.core.composers.self_check import WALK_RATIO, bottomed_out, self_check
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.findings import Finding, worst_first
+from softground_addon.core.ground import presets
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.motion.motion import LowSkin
 from tests.core.character import Slope
 from tests.core.walkers import GRAVITY, MASS, box_sole, pose, pressed, standing, walk
@@ -144,14 +148,25 @@ def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, t
         assert f"'right' of 'walker' is planted {apart * 100:.1f} cm higher" in findings["feet_apart"].message
 
 
-@pytest.mark.parametrize(("height", "remedy"), [(178.0, "by 0.01"), (0.0178, "by 100"), (3.0, ""), (0.1, "")])
-def test_a_body_of_another_unit_is_told_its_scale(height, remedy):
+@pytest.mark.parametrize(
+    ("size", "remedy", "unit"),
+    [
+        (178.0, "by 0.01", "centimetres"),
+        (20.0, "by 0.08", "MMD's units of 8 cm"),
+        (70.0, "by 0.0254", "inches"),
+        (1780.0, "by 0.001", "millimetres"),
+        (0.0178, "by 100", "metres, and was read as centimetres"),
+        (12.0, "", ""),
+        (0.1, "", ""),
+    ],
+)
+def test_a_body_of_another_unit_is_told_its_scale(size, remedy, unit):
     loads = stands()
-    skin = replace(loads.motion.skin, height=height)
-    findings = found(replace(loads, motion=replace(loads.motion, skin=skin)))
+    findings = found(replace(loads, motion=replace(loads.motion, stature=size)))
     assert ("unit_scale" in findings) == bool(remedy)
     if remedy:
         assert remedy in findings["unit_scale"].remedy
+        assert findings["unit_scale"].message.endswith(f"its file is in {unit}.")
 
 
 @pytest.mark.parametrize("share", [1.0, 0.95, 0.5, 0.1])
@@ -196,3 +211,21 @@ def test_the_walk_ratio_is_that_of_an_adult():
 def test_the_worst_is_said_first_and_equals_keep_their_order():
     findings = [Finding(code, severity, "", "") for code, severity in (("a", "note"), ("b", "error"), ("c", "note"))]
     assert [finding.code for finding in worst_first(findings)] == ["b", "a", "c"]
+
+
+@pytest.mark.parametrize(
+    ("preset", "said"),
+    [("fresh_snow", True), ("snow", False), ("mud", False), ("loose_dry_sand", False), ("powder", False)],
+)
+def test_steps_that_end_at_the_bottom_of_the_layer_are_said(preset, said):
+    ground = presets.find(preset)
+    soft = SoftGround(FlatTerrain(), ground.material, ground.pressure)
+    heavy = walk()
+    heavy.forces.forces[:] *= 1.5  # a person with a load
+    footprints = [footprint for result in simulate([heavy], soft, 0.02) for footprint in result.footprints]
+    findings = bottomed_out(footprints, ground.material, "Field")
+    assert [one.code for one in findings] == ["bottomed_out"] * said
+    if said:
+        assert re.match(
+            r"\d of 6 steps press 'Field' as far as it goes, 60 cm: make the layer deeper", findings[0].text
+        )

@@ -9,9 +9,10 @@ import pytest
 
 from softground_addon.core.composers.simulation import Simulation, simulate
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.heightfield import FlatTerrain, Window
+from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose

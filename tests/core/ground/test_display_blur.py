@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from softground_addon.core.ground.display_blur import blurred, blurred_window
-from softground_addon.core.ground.heightfield import HeightField, Window
+from softground_addon.core.ground.heightfield import HeightField
+from softground_addon.core.ground.sparse_grid import Window
 
 CELL = 0.01
 

@@ -8,15 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.heightfield import (
-    PLACES_AT_ONCE,
-    TILE,
-    FlatTerrain,
-    HeightField,
-    SparseGrid,
-    TerrainTiles,
-    Window,
-)
+from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, TerrainTiles
+from softground_addon.core.ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window
 from tests.core.walkers import memory_of
 
 windows = st.builds(

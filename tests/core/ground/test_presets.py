@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
+from softground_addon.core.ground.hand_hardness import boot_depth
 from softground_addon.core.ground.material import GroundMaterial
 
 SHIPPED = sorted(presets.FOLDER.glob("*.json"))
@@ -25,8 +27,37 @@ PAPER_RANGES = {
 }
 
 
-def test_thirteen_presets_are_shipped():
-    assert len(SHIPPED) == 13
+def test_the_presets_are_listed_by_section_and_softness():
+    shown = [presets.load(path) for path in SHIPPED]
+    sections = {
+        section: [one.name for one in presets.soft_to_firm(one for one in shown if one.section == section)]
+        for section in presets.SECTIONS
+    }
+    assert sum(map(len, sections.values())) == len(SHIPPED) == 34
+    assert sections["EVERYDAY"][:3] == ["Powder", "Crust over Powder", "Fresh Fallen Snow"]
+    assert sections["PAPER"] == ["Paper Snow", "Paper Mud", "Paper Soil", "Paper Dry Sand"]
+    assert sections["MEASURED"][0] == "Fresh Snow (field)"
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_preset_of_the_measured_law_says_what_is_measured_and_what_is_placed(path):
+    preset = presets.load(path)
+    if not preset.material.linear:
+        assert re.match("(Measured|Placed)", preset.source)
+
+
+def test_presets_that_shots_refer_to_by_name_hold_what_they_held():
+    assert presets.find("Snow").material == GroundMaterial(375e3, 0.05, 0.2)
+    assert presets.find("Fresh Snow").material == GroundMaterial(74e3, 0.05, 0.2, layer_depth=0.6)
+    assert presets.find("wet_sand").material == GroundMaterial(3.75e6, 0.5, 0.05, rim_bias=0.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "boot"),
+    [("powder", 50), ("settled_snow", 30), ("wet_snow", 20), ("wind_packed_snow", 15), ("piste", 2.8), ("dune", 3.0)],
+)
+def test_a_boot_sinks_as_deep_in_a_preset_as_its_source_says(name, boot):
+    assert boot_depth(presets.find(name).material) * 100 == pytest.approx(boot, rel=0.02)
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -156,6 +187,7 @@ def test_a_missing_file_is_named(tmp_path):
         presets.load(tmp_path / "gone.json")
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes and devices")
 @pytest.mark.timeout(20)
 def test_a_preset_that_never_ends_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.json")

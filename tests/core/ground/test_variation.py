@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.composers.simulation import simulate
-from softground_addon.core.ground.heightfield import FlatTerrain, Window
+from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.ground.variation import SOFTEST, PaintedSurface, VariationTiles
 from softground_addon.core.record.footprints import QUANTUM, recompose

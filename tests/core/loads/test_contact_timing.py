@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.loads.body_dynamics import body_dynamics
+from softground_addon.core.dynamics.body_dynamics import body_dynamics
 from softground_addon.core.loads.contact_timing import Transition, refine_contacts, transitions
 from softground_addon.core.loads.contacts import Contacts
 from softground_addon.core.numerics.intervals import runs

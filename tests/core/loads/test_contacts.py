@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.loads.contacts import detect_contacts
-from softground_addon.core.motion.motion import LowSkin, SoleMotion
+from softground_addon.core.motion.motion import LowSkin
+from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.numerics.intervals import close_short, hysteresis, runs
 from tests.core.character import Slope, character, flat_sole
 from tests.core.prop_bodies import prop_sole, sphere

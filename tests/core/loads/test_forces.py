@@ -181,18 +181,6 @@ def test_a_jump_that_hangs_in_the_air_has_the_forces_of_the_same_jump_at_its_own
     assert np.all(slow_forces[fast_forces == 0] == 0)
 
 
-def test_crisp_landings_move_momentum_in_time_and_add_none():
-    """8 % of 77.5 kg at 2 m/s is 12.4 N·s: given within 50 ms by a raised cosine, it peaks at 2·12.4/0.0485 = 511 N."""
-    motion, touching = landing(rate=240.0)
-    smooth, crisp = (whole_body_forces(motion, touching, crisp_landings=choice) for choice in (False, True))
-    extra = (crisp.forces - smooth.forces)[:, 0, 2]
-    assert extra.sum() * motion.time_step == pytest.approx(0, abs=0.2)
-    assert np.all(extra[:120] == 0)
-    assert 250 < extra.max() < 511
-    assert np.argmax(extra) == pytest.approx(120 + 0.024 * 240, abs=2)
-    assert crisp.total == pytest.approx(crisp.forces.sum(axis=1), abs=1e-9)
-
-
 def test_feet_apart_push_against_each_other_along_their_legs():
     """Each foot of a body at rest presses along the line from its hip; together they press straight down."""
     count, places = 60, {"hips": (0.0, 0.0, 0.9), "hip_l": (0.0, 0.1, 0.9), "hip_r": (0.0, -0.1, 0.9)}

@@ -10,8 +10,9 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.loads.free_bodies import SHORTEST_CONTACT
-from softground_addon.core.motion.motion import CharacterMotion, SoleMotion
+from softground_addon.core.motion.motion import CharacterMotion
 from softground_addon.core.motion.props import mass_properties
+from softground_addon.core.motion.sole_motion import SoleMotion
 from tests.core.prop_bodies import box, prop_sole, sphere
 from tests.core.walkers import pose, pressed
 

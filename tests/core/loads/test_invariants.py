@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.dynamics.body_dynamics import body_dynamics, with_flight
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.loads.body_dynamics import body_dynamics, with_flight
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.numerics.intervals import runs
@@ -84,6 +84,7 @@ def in_units(motion, factor):
         joints={name: path * factor for name, path in motion.joints.items()},
         soles=tuple(scaled(sole) for sole in motion.soles),
         skin=LowSkin(motion.frames, far_up, far_up[..., 2], 0.3 * factor, 1.78 * factor),
+        stature=1.6 * factor,
     )
 
 

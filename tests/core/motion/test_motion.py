@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from softground_addon.core.motion import motion
+from softground_addon.core.motion import motion, sole_motion
 
 
 def rolling_sole(frames: int, rate: float) -> motion.CharacterMotion:
@@ -17,14 +17,14 @@ def rolling_sole(frames: int, rate: float) -> motion.CharacterMotion:
     transforms[:, 0, 0, 2] = np.sin(angle)
     transforms[:, 0, 2, 0] = -np.sin(angle)
     transforms[:, 0, 0, 3] = times
-    sole = motion.Sole("foot", "", (), np.array([[0.1, 0.0, 0.0]]), np.array([0]), np.zeros((0, 2)))
+    sole = sole_motion.Sole("foot", "", (), np.array([[0.1, 0.0, 0.0]]), np.array([0]), np.zeros((0, 2)))
     return motion.CharacterMotion(
         "walker",
         70.0,
         0.9,
         np.arange(frames) + 1.0,
         rate,
-        (motion.SoleMotion(sole, transforms),),
+        (sole_motion.SoleMotion(sole, transforms),),
         {"hips": transforms[:, 0, :3, 3]},
     )
 
@@ -58,7 +58,7 @@ def test_somebody_who_only_nods_does_not_stand_still():
     standing = walking.soles[0].transforms[:1].repeat(30, axis=0)
     still = dataclasses.replace(
         walking,
-        soles=(motion.SoleMotion(walking.soles[0].sole, standing),),
+        soles=(sole_motion.SoleMotion(walking.soles[0].sole, standing),),
         joints={"hips": path, "head": path.copy()},
     )
     assert still.stands_still

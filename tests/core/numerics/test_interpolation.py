@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softground_addon.core.motion.motion import orthonormal
+from softground_addon.core.motion.sole_motion import orthonormal
 from softground_addon.core.numerics.interpolation import STRETCH, Between, cubic, in_stretches, turning
 from softground_addon.core.numerics.rigid import rotation
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from softground_addon.core.ground.heightfield import Window
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.numerics.packed import PackedArray
 from softground_addon.core.playback import blocks, playback_curves, vertex_histories
 from softground_addon.core.playback.blocks import ChangesInBlocks

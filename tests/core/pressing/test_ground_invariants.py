@@ -47,7 +47,7 @@ def check_every_frame(loads, terrain, material, cell_size):
             before = previous.get(window, np.zeros_like(state))
             assert (state[0] >= before[0]).all(), "compression only grows"
             assert material.repose_angle or (state[1] >= before[1]).all(), "a rim that does not slide only grows"
-            assert (state[0] <= material.layer_depth).all()
+            assert (state[0] <= material.deepest * (1 + 1e-12)).all()
             previous[window] = state
         compressed, rim = result.ground.volumes()
         unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
@@ -82,6 +82,10 @@ materials = st.builds(
     characteristic_time=st.floats(0.002, 1.0),
     layer_depth=st.floats(0.01, 1.0),
     rim_reach=st.floats(0.0, 0.1),
+    exponent=st.sampled_from([1.0]) | st.floats(0.2, 3.0),
+    densest=st.sampled_from([0.0]) | st.floats(0.01, 1.0),
+    edge_width=st.floats(0.0, 1.0),
+    spread=st.floats(0.0, 3.0),
 )
 
 

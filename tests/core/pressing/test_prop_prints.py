@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from softground_addon.core.composers.prediction import contact_loads
+from softground_addon.core.composers.prediction import pressed_contacts
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.numerics.rigid import rotation
 from softground_addon.core.pressing.indentation import Springs, stress
 from tests.core.character import Slope
@@ -77,7 +78,9 @@ def test_a_box_on_the_edge_of_the_ground_digs_in_no_deeper_than_beside_it(share)
     assert print_.max_depth_m == pytest.approx(whole.max_depth_m, rel=0.01)
     assert print_.area_m2 == pytest.approx(share * whole.area_m2, abs=1.1 * 0.01 * size)
     assert print_.compressed_m3 == pytest.approx(share * whole.compressed_m3, rel=0.01, abs=0.03 * whole.compressed_m3)
-    assert contact_loads([loads], terrain, 0.01).deepest(GROUND) == pytest.approx(print_.max_depth_m, rel=0.03)
+    assert pressed_contacts([loads], SoftGround(terrain, GROUND), 0.005).typical == pytest.approx(
+        print_.max_depth_m, rel=0.03
+    )
 
 
 def test_a_tilted_box_presses_a_wedge_that_carries_the_same_load():

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.heightfield import FlatTerrain, TerrainTiles
-from softground_addon.core.motion.motion import Sole
+from softground_addon.core.motion.sole_motion import Sole
 from softground_addon.core.pressing.sole_imprint import cell_coverage
 from softground_addon.core.pressing.sole_points import TOLERANCE, centroid, contact_window, point_contact, sole_points
 from tests.core.walkers import box_sole, foot_sole, pose, sphere_sole

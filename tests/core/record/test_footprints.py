@@ -9,9 +9,10 @@ import pytest
 
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.heightfield import FlatTerrain, Window
+from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.record.footprint_arrays import from_arrays, to_parts
 from softground_addon.core.record.footprints import (
     LARGEST_AMOUNT,

@@ -11,7 +11,7 @@ from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.record import ground_history
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.ground_history import GroundHistory
-from tests.core.response.test_grounding import walk
+from tests.core.legs.test_grounding import walk
 
 SAND = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.4, characteristic_time=0.1)
 

@@ -9,7 +9,7 @@ import pytest
 from softground_addon.core.composers.relief_plan import TREAD
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.ground.presets import SURFACES
+from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.playback.ramps import QUANTUM
 from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import sample_at

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softground_addon.core.ground.presets import SURFACES
-from softground_addon.core.motion.motion import Sole
+from softground_addon.core.ground.surfaces import SURFACES
+from softground_addon.core.motion.sole_motion import Sole
 from softground_addon.core.record.pressed_ground import sample_at
 from softground_addon.core.relief import amounts
 from softground_addon.core.relief.steps import ReliefSettings, relief_of_steps

@@ -7,15 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softground_addon.core.ground.heightfield import FlatTerrain
-from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.legs.foot_lock import underside_on
+from softground_addon.core.legs.grounding import responding
+from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.numerics.orientation import rotation_vectors
 from softground_addon.core.numerics.rigid import displacement, rotation
 from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.clean_feet import clean, foot_faults, missed_holds, standing
 from softground_addon.core.response.foot_holds import MODES, FootHold, HeldContacts
-from softground_addon.core.response.foot_lock import underside_on
-from softground_addon.core.response.grounding import responding
-from tests.core.response.test_grounding import walk
+from tests.core.legs.test_grounding import walk
 
 FLOOR = FlatTerrain(0.0)
 HEEL, BALL, TOE = range(3)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.legs.grounding import leg_of, leg_soles, responding
 from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.record.edits import StepEdit, step_id
-from softground_addon.core.response.grounding import leg_of, leg_soles, responding
 from softground_addon.core.response.moved_steps import DEEPEST, follow
 from softground_addon.core.response.response import GroundingOptions, respond
-from tests.core.response.test_grounding import walk
+from tests.core.legs.test_grounding import walk
 
 FLOOR = FlatTerrain(0.0)
 MOVE, TURN = (0.10, 0.06), 20.0

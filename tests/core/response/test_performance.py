@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softground_addon.core.response.grounding import Response, responding
+from softground_addon.core.legs.grounding import Response, responding
 from softground_addon.core.response.performance import (
     ARMS_OUT,
     Performance,
@@ -14,7 +14,7 @@ from softground_addon.core.response.performance import (
     swing_progress,
 )
 from softground_addon.core.response.response import GroundingOptions, _acted
-from tests.core.response.test_grounding import LEG, Ground, placed, walk
+from tests.core.legs.test_grounding import LEG, Ground, placed, walk
 
 DEEP = Ground(lambda x, y, t: -0.12)
 FLAT = Ground(lambda x, y, t: 0.0)

@@ -6,7 +6,7 @@ import pytest
 from softground_addon.core.response.response import SUPPORT_TIME, TiltOptions, _lean, _support
 from softground_addon.core.response.tilt import TiltGains
 from tests.core.character import standing
-from tests.core.response.test_grounding import walk
+from tests.core.legs.test_grounding import walk
 
 
 class Sudden:

@@ -98,10 +98,16 @@ def test_no_torque_acts_in_flight():
     assert not lean(slope, frame_rate=60, gains=TiltGains(), supported=np.zeros(len(slope))).any()
 
 
+def torques(gains, inertia, arm):
+    """The paper's alpha [N] and beta [N·m·s] of a body: I·w²/l and 2·zeta·I·w."""
+    natural = 2 * np.pi * gains.frequency
+    return inertia * natural**2 / arm, 2 * gains.damping * inertia * natural
+
+
 def test_gains_and_torques_are_two_words_for_one_thing():
     for mass, arm in ((0.02, 0.03), (77.5, 1.0), (2000.0, 3.0)):
         inertia = capsule_inertia(mass, 2 * arm, 0.2 * arm)
-        alpha, beta = TiltGains(0.6, 0.85).torques(inertia=inertia, arm=arm)
+        alpha, beta = torques(TiltGains(0.6, 0.85), inertia, arm)
         gains = TiltGains.from_torques(alpha, beta, inertia=inertia, arm=arm)
         assert (gains.frequency, gains.damping) == pytest.approx((0.6, 0.85))
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from softground_addon.core.skin.bearing import bearing, without_glimpses
 from softground_addon.core.skin.contacts import SkinContacts, find_contacts
 from softground_addon.core.skin.ground_level import ground_of
+from softground_addon.core.skin.merging import merged
 from softground_addon.core.skin.skin_motion import PartTracks, SkinMotion, track_parts
 
 RATE, PERIOD, FRAMES = 30.0, 30, 90
@@ -209,6 +210,17 @@ def test_a_foot_that_only_brushes_the_ground_is_a_contact_beside_its_twin(seen: 
         assert found.bears[:, found.group[0]].all()
 
 
+def test_a_foot_that_kicks_and_stands_still_for_a_moment_is_a_contact() -> None:
+    """It is seldom on the ground, as a brush, but moves only while it is in the air."""
+    skin, _ = animal(1, duty=0.999, stride=0.0)
+    away = np.clip(np.abs(np.arange(FRAMES) - 40) - 2, 0, 12)
+    for drags, contacts in ((0.0, 2), (0.02, 1)):
+        kicking = with_limb(skin, 0.02 * away, np.array([0, 1, 2]))
+        kicking.positions[:, kicking.part == 2, 0] += (0.1 * away + drags * np.arange(FRAMES))[:, None]
+        found = find_contacts(kicking)
+        assert found.bears.shape[1] == contacts
+
+
 @pytest.mark.parametrize("on_the_spot", [False, True])
 def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) -> None:
     skin, _ = animal(2, duty=0.6, stride=0.6, on_the_spot=on_the_spot)
@@ -368,6 +380,37 @@ def test_a_foot_that_stands_in_two_pieces_is_one_contact() -> None:
     found = find_contacts(SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height))
     assert found.group[0] == found.group[-1]
     assert found.bears.shape[1] == 2
+
+
+def test_pieces_on_different_branches_that_move_alike_are_one_contact() -> None:
+    """A sole on a bone for inverse kinematics, and the end of the leg that follows it; the other foot is not of it."""
+    skin, _ = animal(2, duty=0.6, stride=0.6)
+    heel = (skin.part == 0) & (np.arange(len(skin.part)) < 16)
+    part = np.where(heel, skin.part.max() + 1, skin.part)
+    order = np.argsort(part, kind="stable")
+    links = np.zeros((4, 4), dtype=bool)
+    beside = np.ones((4, 4), dtype=bool)  # even the feet lie side by side
+    twin = np.array([1, 0, 2, 3])
+    for against, contacts in ((beside, 2), (None, 3)):
+        skin_of_feet = SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height, twin, against)
+        found = find_contacts(skin_of_feet)
+        assert found.bears.shape[1] == contacts
+        assert (found.group[0] == found.group[3]) == (against is not None)
+
+
+def test_what_is_one_foot_on_the_left_is_one_on_the_right() -> None:
+    """The right heel mostly bears when its toes have left, as no left one does."""
+    bears = np.zeros((40, 4), dtype=bool)  # toes and heel of the left foot, and of the right one
+    bears[0:12, 0] = bears[0:10, 1] = bears[20:32, 2] = bears[30:36, 3] = True
+    links = np.zeros((4, 4), dtype=bool)
+    links[0, 1] = links[1, 0] = links[2, 3] = links[3, 2] = True
+    places, still = np.zeros((40, 4, 2)), np.zeros((40, 4))
+    tracks = PartTracks(still, places, still, np.zeros((2, 40, 4, 2)), 0.15, 24.0)
+    alone = merged(tracks, bears, links, np.zeros_like(links))
+    assert alone[0] == alone[1]
+    assert alone[2] != alone[3]
+    both = merged(tracks, bears, links, np.zeros_like(links), np.array([2, 3, 0, 1]))
+    assert both[0] == both[1] != both[2] == both[3]
 
 
 def test_skin_that_never_comes_to_rest_has_no_contact() -> None:

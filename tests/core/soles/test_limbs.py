@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from softground_addon.core.dynamics.centre_of_mass import centre_of_mass
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.loads.centre_of_mass import centre_of_mass
 from softground_addon.core.loads.estimate import estimate_loads
-from softground_addon.core.motion.motion import CharacterMotion, SoleMotion
+from softground_addon.core.motion.motion import CharacterMotion
+from softground_addon.core.motion.sole_motion import SoleMotion
 from tests.core.prop_bodies import prop_sole, sphere
 from tests.core.walkers import pose
 

@@ -10,9 +10,10 @@ import numpy as np
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
-from tests.gui.stories.edit_steps import module, show_alone
+from tests.gui.stories.edit_steps import show_alone
+from tests.gui.stories.first_minutes import layers
 from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
 FRAMES, RATE, FRAME = 60, 24, 20
@@ -33,7 +34,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
 
     yield from hand.press_button("softground.clean_feet", offset=0.25)
     yield from done(hand)
-    facts["tracks"] = [track.name for track in armature.animation_data.nla_tracks]
+    facts["layers"] = layers(armature)
     facts["pitch"] = [pitch(armature)]
 
     scene().frame_set(FRAME)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-
 import bpy
 import numpy as np
 
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
 from tests.gui.stories.interrupted_bake import ADD_ON, reopen, scene, session, with_viewport
 
@@ -115,9 +113,7 @@ def back_and_forth(expected: np.ndarray) -> Steps:
 
 
 def answering() -> bool:
-    return next(
-        m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.live.live")
-    ).is_answering()
+    return module("live.live").is_answering()
 
 
 def heights() -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import Any
 
@@ -11,7 +10,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 
 from tests.blender import fingerprints
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
 from tests.gui.stories.interrupted_bake import differences, reopen, scene, session, with_viewport
 
@@ -37,12 +36,16 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.press_button("softground.choose_step", offset=0.3)
     yield 0.3
     facts["chosen"] = session().step
-    facts["frame"] = scene().frame_current, steps()[0].frames[0]
+    facts["frame"] = scene().frame_current, steps()[0].there_from
+    middle = steps()[0].outline().mean(axis=0)
+    facts["off centre"] = (hand.area().spaces.active.region_3d.view_location - Vector(middle)).length
     yield from look_from_above(hand)
     yield from hand.picture("panel_steps", of="UI")
 
     yield from hand.press_button("softground.mute_step", offset=0.25)
     yield 0.5
+    yield from hand.wait_for(lambda: not session().is_baking, 60)
+    yield 0.3
     facts["muted"] = edits()
     yield from hand.move(*hand.middle())
     yield from hand.key("Z", ctrl=True)
@@ -65,7 +68,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.press_button("softground.drag_step")
     yield from drag(hand, facts, dy=0.3)
     hand.event("LEFTMOUSE", "RELEASE")
-    yield 1.5
+    yield from pressed(hand)
     facts["dragged"] = edits()
     dragged = prints()
     yield from hand.picture("steps_moved", in_docs=False)
@@ -103,7 +106,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     before = edits()
     yield from drag(hand, {}, dy=0.2)
     hand.event("LEFTMOUSE", "RELEASE")
-    yield 1.5
+    yield from pressed(hand)
     after = edits()
     facts["dragged together"] = [after[step.name][2] - before.get(step.name, [0, 0, 0])[2] for step in wanted]
 
@@ -125,10 +128,29 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.picture("steps_change", in_docs=False)
     yield from hand.key("ESC")
     yield 0.5
-    yield from hand.move(*hand.middle())
-    yield from hand.key("Z", ctrl=True)
+    facts["chosen in a dialog"] = strength_of(name)
+    with_viewport(hand, bpy.ops.softground.change_step, "INVOKE_DEFAULT", True, step=name)
     yield 1.0
+    x, y = hand.place
+    for higher in range(0, 240, 20):  # past all numbers of the dialog
+        yield from hand.move(x, y + higher)
+        yield from hand.key("WHEELUPMOUSE", ctrl=True)
+    yield from hand.picture("steps_changed", in_docs=False)
+    yield from hand.key("RET")
+    yield from pressed(hand)
+    facts["changed in a dialog"] = strength_of(name)
+    yield from hand.move(*hand.middle())
+    for _ in ("changed", "in a shoe"):
+        yield from hand.key("Z", ctrl=True)
+        yield 1.0
     facts["without the shoe"] = area_of(name)
+
+
+def pressed(hand: Hand) -> Steps:
+    """Wait until steps that were changed are pressed."""
+    yield from hand.wait_for(lambda: session().is_baking, 10)
+    yield from hand.wait_for(lambda: not session().is_baking, 60)
+    yield 0.5
 
 
 def show_alone(panel: type, tab: str = "") -> None:
@@ -140,13 +162,13 @@ def show_alone(panel: type, tab: str = "") -> None:
     bpy.utils.register_class(type(shown["bl_idname"], panel.__bases__, shown))
 
 
-def module(name: str) -> Any:
-    """A module of the add-on, whatever Blender has named its package."""
-    return next(one for key, one in sys.modules.items() if key.endswith(f"softground_addon.blender.{name}"))
+def strength_of(name: str) -> float:
+    """Depth of a step relative to its baked print."""
+    return module("ground.baked_ground").edits_of(scene().softground.ground)[name].strength
 
 
 def steps() -> Any:
-    return module("interface.baked_steps").of(scene())
+    return module("operators.baked_steps").of(scene())
 
 
 def edits() -> dict:
@@ -207,7 +229,7 @@ def drag(hand: Hand, facts: dict, *, dy: float, picture: str = "") -> Steps:
     middle = steps()[2].outline().mean(axis=0)
     yield from hand.move(*on_screen(hand, middle))
     yield 0.3
-    facts["under the mouse"] = module("interface.step_dragging")._shown.under == steps()[2].name
+    facts["under the mouse"] = module("state").state.under == steps()[2].name
     hand.event("LEFTMOUSE", "PRESS")
     yield 0.5
     took = timed(module("baking.step_preview").StepPreview, "show")

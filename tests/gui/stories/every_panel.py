@@ -14,7 +14,7 @@ from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
 COLUMNS = (
     ("soles", "joints"),
-    ("material", "layers"),
+    ("prints", "material", "layers"),
     ("painted", "mesh", "overlay"),
     ("response", "foot_locks", "output"),
     ("weather", "steps"),

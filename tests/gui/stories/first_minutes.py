@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.stories.interrupted_bake import ADD_ON, scene, session
 
 TYPED = 9.0
@@ -17,7 +17,15 @@ TYPED = 9.0
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
     facts["to begin with"] = sorted(obj.name for obj in scene().objects), names(hand, "selected_objects")
+    with bpy.context.temp_override(window=hand.window):
+        bpy.ops.preferences.addon_disable(module=ADD_ON)
+        bpy.ops.preferences.addon_enable(module=ADD_ON)
+    yield 1.5
+    yield from hand.move(*hand.middle())
+    yield from hand.picture("enabled", in_docs=False)
     ours = bpy.context.preferences.addons[ADD_ON].preferences
+    waits = [one.bl_idname for one in hand.window.modal_operators]
+    facts["told where it is"] = ours.was_told and "SOFTGROUND_OT_tell_where" not in waits
     ours.default_preset = "Mud"
     facts["preferred"] = title()
     ours.default_preset = "Snow"
@@ -36,9 +44,12 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["prints"] = summary()
     facts["frame"] = scene().frame_current, scene().frame_start, scene().frame_end
     facts["deepest in view"] = deepest()
+    yield from hand.picture("first_bake", in_docs=False)
+    facts["prints in view"], facts["shading"] = prints_in_view(hand), shading(hand)
+    facts["debris"] = any(obj.name.startswith("SoftGround Debris") for obj in scene().objects)
     ground = scene().softground.ground
     facts["ground"] = [*ground.dimensions[:2]], names(hand, "selected_objects"), names(hand, "collection")
-    facts["tracks"] = tracks(figure)
+    facts["layers"] = layers(figure)
     facts["up to date"] = yield from operator_at(hand, bake)
 
     yield from hand.move(*hand.middle())
@@ -81,10 +92,28 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.5
     facts["cleared"] = {
         "deepest": deepest(),
-        "tracks": tracks(figure),
+        "layers": layers(figure),
         "action": figure.animation_data.action is not None,
         "grounding": scene().softground.grounding.use,
     }
+
+
+def prints_in_view(hand: Hand) -> list[tuple[float, float, float]]:
+    """Place in the viewport, 0 to 1 across and up, and width of each print that is there [px]."""
+    window, view = hand.region("WINDOW"), hand.area().spaces.active.region_3d
+    steps = module("operators.baked_steps")
+    found = []
+    for step in steps.of(scene()):
+        corners = [location_3d_to_region_2d(window, view, point) for point in step.outline().tolist()]
+        if step.there_from <= scene().frame_current and all(corners):
+            across, up = (np.array(side) for side in zip(*corners, strict=True))
+            found.append((across.mean() / window.width, up.mean() / window.height, float(np.ptp(across))))
+    return found
+
+
+def shading(hand: Hand) -> list:
+    space = hand.area().spaces.active
+    return [space.shading.studio_light, space.shading.show_cavity, space.shading.show_object_outline]
 
 
 def ended(hand: Hand) -> Steps:
@@ -117,16 +146,17 @@ def names(hand: Hand, member: str) -> list[str]:
 
 def title() -> str:
     """What the preset menu shows."""
-    menu = next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.interface.preset_menu"))
-    return menu.title_of_ground(scene())
+    menu = module("panels.preset_menu")
+    return menu.title_of_ground(scene().softground)
 
 
 def looks(ground: bpy.types.Object) -> list[str]:
     return [slot.material.name for slot in ground.material_slots]
 
 
-def tracks(figure: bpy.types.Object) -> list[str]:
-    return [track.name for track in figure.animation_data.nla_tracks]
+def layers(figure: bpy.types.Object) -> list[str]:
+    """Names of the constraints on the figure and its bones, each once."""
+    return sorted({one.name for owner in (figure, *figure.pose.bones) for one in owner.constraints})
 
 
 def summary() -> dict:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 
 import bpy
 import numpy as np
 
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
 
 FRAME = 150
@@ -66,10 +65,12 @@ def on_new_ground(hand: Hand) -> Steps:
     yield 0.2
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield from hand.press_button("softground.create_ground", offset=0.25)
+    yield 0.2
+    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
 
 
 def live():
-    return next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.live.live"))
+    return module("live.live")
 
 
 def answering():
@@ -80,7 +81,7 @@ class parts_timed:  # noqa: N801
     """What the parts of an answer take of the processor, in the order in which they are done [s]."""
 
     def __enter__(self) -> list[float]:
-        mode, self.parts = live()._mode, []
+        mode, self.parts = live().state.live, []
         self.mode, self.answer = mode, mode.answer
 
         def timed(*arguments):

@@ -4,18 +4,16 @@ curves in the Graph Editor."""
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import bpy
 
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
-from tests.gui.stories.first_minutes import ended, tracks
+from tests.gui.stories.first_minutes import ended, layers
 from tests.gui.stories.interrupted_bake import ADD_ON, scene, with_viewport
 from tests.gui.stories.presets_and_search import search
 
@@ -89,7 +87,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 
     yield from search(hand, "Clear Bake")
     yield 0.5
-    facts["cleared"] = materials(terrain), tracks(armature)
+    facts["cleared"] = materials(terrain), layers(armature)
 
     # the preferences: a manual and a bug report
     yield from open_preferences(hand, area)
@@ -145,7 +143,7 @@ def select(obj: bpy.types.Object) -> None:
 
 def displayed() -> bpy.types.Object:
     """What takes the prints: the terrain or its finer copy."""
-    ground = ours("blender.ground.baked_ground")
+    ground = module("ground.baked_ground")
     return ground.display_mesh_of(scene().softground.ground)
 
 
@@ -155,12 +153,8 @@ def materials(obj: bpy.types.Object) -> list[str]:
 
 def pictures() -> dict[str, bool]:
     """Which of the presets that come with the add-on have a picture in the menu."""
-    menu, icons = ours("blender.interface.preset_menu"), ours("blender.interface.preset_icons")
+    menu, icons = module("panels.preset_menu"), module("panels.preset_icons")
     return {preset.name: icons.of(path) > 0 for path, preset in menu.listed(menu.presets.FOLDER)[0]}
-
-
-def ours(name: str) -> Any:
-    return next(module for path, module in sys.modules.items() if path.endswith(f"softground_addon.{name}"))
 
 
 def window_of(area: bpy.types.Area) -> bpy.types.Region:

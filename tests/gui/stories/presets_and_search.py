@@ -15,7 +15,7 @@ SEARCHED = (
     "Predict Depth",
     "Create Ground",
     "Bake Footprints",
-    "Go to Last Step",
+    "Show Prints",
     "Apply Look",
     "Add Force Curves",
     "Clear Bake",

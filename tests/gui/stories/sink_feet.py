@@ -6,6 +6,7 @@ import bpy
 
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
+from tests.gui.stories.first_minutes import layers
 from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
 
@@ -38,7 +39,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
             yield 0.25
     facts["left"] = floating()
     facts["grounding"] = scene().softground.grounding.use
-    facts["tracks"] = [track.name for track in armature.animation_data.nla_tracks]
+    facts["layers"] = layers(armature)
     facts["stale"] = session().stale
 
     show_open(bpy.types.SOFTGROUND_PT_response)
@@ -51,9 +52,12 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield 0.5
     facts["undone"] = floating(), scene().softground.grounding.use
 
-    # another day
     yield from hand.key("Z", ctrl=True, shift=True)
     yield 0.5
+    yield from another_day(hand, facts)
+
+
+def another_day(hand: Hand, facts: dict) -> Steps:
     shot = str(hand.pictures / "sunk.blend")
     with_viewport(hand, bpy.ops.wm.save_as_mainfile, filepath=shot)
     with_viewport(hand, bpy.ops.wm.open_mainfile, filepath=shot)
@@ -61,6 +65,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.predict_depth")
     yield 1.0
+    yield from hand.wait_for(lambda: not session().is_baking, 60)
     with_viewport(hand, bpy.ops.softground.overlay)
     yield 1.0
     summary = dict(scene().softground.ground.data["softground_summary"])

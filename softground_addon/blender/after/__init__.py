@@ -1,1 +1,0 @@
-"""What a bake throws, as native data that plays without the add-on."""

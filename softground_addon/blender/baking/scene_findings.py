@@ -1,0 +1,162 @@
+"""What is not at work in a scene though its user may think so, or works otherwise in a bake: each with its remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.findings import Finding, listed
+from ...core.motion.motion import CharacterMotion
+from ...core.settings import BakeSettings
+from ..characters.selection import all_leaders
+from ..compat import HAS_SLOTS, slot_of
+from ..ground.still_ground import changes_shape
+from ..reading import staleness
+from ..reading.shots import Shot
+from ..rigs.frame_ranges import playing_tracks
+from ..sampling.instances import crowd_finding, instancers
+
+UPRIGHT = 0.9998
+"""Gravity whose downward part is less than this points elsewhere (1°)."""
+
+ROUNDING = 0.25
+"""Rounding of positions from which steps are off, in cells."""
+
+_NO_MOTION = ("hide", "show_", "color", "display", "layers", "is_visible")
+"""Words in the paths of drivers that move nothing."""
+
+
+def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> list[Finding]:
+    """What the user should know of a scene whose shot was just read."""
+    movers = [mover for character in wanted.characters for mover in staleness.movers_of(character)]
+    followed = list(dict.fromkeys(node for mover in movers for node in (mover, *all_leaders(mover))))
+    first, last = (frame * wanted.time_stretch for frame in wanted.frames)
+    return [
+        *shot.findings,
+        *(finding for motion in shot.motions for finding in _distance(motion, wanted)),
+        *_idle_actions(followed, first, last),
+        *_idle_drivers(followed),
+        *shape_findings(mover for mover in movers if mover.type == "MESH"),
+        *_crowds(scene, wanted),
+        *_gravity(scene, wanted),
+    ]
+
+
+def _gravity(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+    """Gravity that does not point down."""
+    if scene.use_gravity and scene.gravity.length > 0 and -scene.gravity.normalized().z < UPRIGHT:
+        yield Finding(
+            "gravity_direction",
+            "note",
+            f"Gravity of scene '{scene.name}' points along ({', '.join(f'{part:g}' for part in scene.gravity)}), but "
+            f"bodies weigh straight down in a bake, by {wanted.gravity_m_s2:.2f} m/s².",
+            "Turn the shot so that down is -Z, and set Gravity in the Scene properties to match.",
+        )
+
+
+def _distance(motion: CharacterMotion, wanted: BakeSettings) -> Iterator[Finding]:
+    """Places so far away that single precision does not tell cells apart."""
+    far = max((float(np.abs(sole.transforms[..., :3, 3]).max()) for sole in motion.soles), default=0.0)
+    step = float(np.spacing(np.float32(far / wanted.unit_scale_m))) * wanted.unit_scale_m
+    if step > ROUNDING * wanted.cell_size_m:
+        yield Finding(
+            "far_from_origin",
+            "warning",
+            f"'{motion.name}' is {far / 1e3:.0f} km from the world's origin, where Blender rounds positions to "
+            f"{step * 100:.2g} cm: steps are off by as much, and prints too deep or too shallow.",
+            "Move the character and its ground to the origin, and bake again.",
+        )
+
+
+def _idle_actions(objects: Iterable[bpy.types.Object], first: float, last: float) -> Iterator[Finding]:
+    """Actions and strips within some frames of the animation that move nothing."""
+    for obj in objects:
+        animation: Any = obj.animation_data
+        if animation is None:
+            continue
+        if animation.action and not animation.use_tweak_mode and (lacking := _lacks(animation)):
+            yield Finding(
+                "no_slot",
+                "warning",
+                f"The action '{animation.action.name}' of '{obj.name}' has no {lacking} there and moves nothing",
+                f"choose its {lacking} in the Action Editor, or unlink the action.",
+            )
+        tracks = playing_tracks(animation) if animation.use_nla else ()
+        for strip in (strip for track in tracks for strip in _clips(track.strips)):
+            within = strip.frame_start < last and strip.frame_end > first
+            if within and not strip.mute and (lacking := _lacks(strip)):
+                yield Finding(
+                    "no_slot",
+                    "warning",
+                    f"NLA strip '{strip.name}' of '{obj.name}' has no {lacking}: nothing moves by it in frames "
+                    f"{strip.frame_start:.0f}-{strip.frame_end:.0f}.",
+                    f"Choose its {lacking} in the sidebar of the NLA editor, or mute the strip.",
+                )
+
+
+def _clips(strips: Iterable[Any]) -> Iterator[Any]:
+    """The strips that play an action, also within meta strips."""
+    for strip in strips:
+        if strip.type == "META" and not strip.mute:
+            yield from _clips(strip.strips)
+        elif strip.type == "CLIP":
+            yield strip
+
+
+def _lacks(owner: Any) -> str:
+    """What animation data or a strip lacks to move anything; an empty text where it plays."""
+    if owner.action is None:
+        return "action"
+    return "slot" if HAS_SLOTS and slot_of(owner) is None and len(owner.action.slots) else ""
+
+
+def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
+    """Drivers that Blender could not evaluate as the shot was read."""
+    owners = dict.fromkeys(node for obj in objects for node in (obj, obj.data) if node and node.animation_data)
+    idle = [
+        (owner.name, curve.data_path)
+        for owner in owners
+        for curve in owner.animation_data.drivers
+        if not (curve.mute or curve.driver.is_valid or any(word in curve.data_path for word in _NO_MOTION))
+    ]
+    if not idle:
+        return
+    names, paths = map(dict.fromkeys, zip(*idle, strict=True))
+    held, many = bool(bpy.app.autoexec_fail), len(idle) > 1
+    yield Finding(
+        "idle_drivers",
+        "warning",
+        f"{len(idle)} driver{'s' if many else ''} of {listed(names)} {'do' if many else 'does'} not run (on "
+        f"{listed(paths)}){', as Auto Run Python Scripts is off' if held else ''}, and nothing moves by "
+        f"{'them' if many else 'it'}",
+        "switch it on in Preferences > Save & Load and open the file again, or key what they do (Object > Animation > "
+        "Bake Action)."
+        if held
+        else "correct its expression and variables in the Drivers editor, or remove it.",
+    )
+
+
+def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
+    """Objects that change their shape over time, and print as rigid bodies."""
+    changing = [(obj.name, by) for obj in objects if (by := changes_shape(obj))]
+    return [
+        Finding(
+            "changing_shape",
+            "warning",
+            f"'{name}' changes its shape by {by}, but prints as a rigid body, in the shape of the frame that is shown.",
+            "Let an armature move its parts, or keys the object itself.",
+        )
+        for name, by in changing
+    ]
+
+
+def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
+    """Copies of what prints that are instances."""
+    showing = instancers(scene, staleness.bodies_of(scene, wanted))
+    return [
+        crowd_finding([name for name, other in showing.items() if other == shown], shown)
+        for shown in dict.fromkeys(showing.values())
+    ]

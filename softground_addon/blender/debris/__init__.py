@@ -1,0 +1,1 @@
+"""What a bake throws, as an object of points that plays by itself."""

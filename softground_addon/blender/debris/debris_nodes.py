@@ -1,0 +1,188 @@
+"""The node group that lets debris fly: each point's birth and first speed in, where it is at the time out.
+
+It is native Blender data and needs nothing of this add-on; the closed form is that of `core.debris.flight`.
+
+Points lie where they come to rest, so that only what flies is worked out in a frame, and nothing is left out before the
+end, so that what does not change is never copied. The largest pieces become instances of shapes, which take about 50 ns
+each in every frame whatever they are [measured]; all else becomes round points, which take next to nothing.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import bpy
+
+from ..node_graph import NodeGraph
+from ..node_modifiers import new_group
+
+GROUP = "SoftGround Debris"
+MARK = "softground_debris"
+"""Custom property of the group, of its object and of the collections of shapes."""
+
+BIRTH, FLIGHT, DRAG = "softground_birth", "softground_flight", "softground_drag"
+"""Of a point: frame of its birth, time in the air [s], settling speed over gravity [s]."""
+SMALL = "softground_small"
+"""Whether it is one of the seen round points."""
+START, LAUNCH = "softground_start", "softground_launch"
+"""Its first place [Blender units] and its first speed [Blender units/s]."""
+RANK = "softground_rank"
+"""Its place in the order of size, from 0 for the largest."""
+RADIUS, VELOCITY, AGE, KIND, STEP = "radius", "velocity", "age", "kind", "step"
+
+SHAPED = 4000
+"""How many of the largest pieces have a shape at first."""
+FULL_TURNS = 12.0
+"""How fast pieces turn in the air [rad/s]."""
+
+
+def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.types.Collection, material: Any) -> Any:
+    """A new node group.
+
+    Parameters
+    ----------
+    frame_rate : float
+        Frames that the scene's time counts per second [Hz].
+    gravity : float
+        [m/s²]
+    unit_scale : float
+        Metres per Blender unit.
+    shapes : bpy.types.Collection
+        What large pieces look like, of radius 1.
+    material : bpy.types.Material
+        Of the small ones.
+    """
+    graph = _Graph()
+    geometry, wind, amount, shaped, collection = graph.inputs(shapes)
+    geometry = _thinned(graph, geometry, amount)
+    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
+    since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
+    geometry = graph.store(geometry, AGE, since, True)
+    geometry = _moved(graph, geometry, wind, gravity=gravity, unit_scale=unit_scale)
+    geometry = graph.forgotten(geometry, BIRTH, DRAG, START, LAUNCH)
+    unseen = graph.less(graph.attribute(AGE), 0.0)
+    large = graph.less(graph.attribute(RANK), shaped)
+    geometry = graph.store(geometry, SMALL, graph.logic("NOR", unseen, large), True, "BOOLEAN")
+    points = _points(graph, graph.forgotten(geometry, FLIGHT, RANK), material)
+    few = graph.without(geometry, graph.logic("NOT", large))
+    pieces = _pieces(graph, few, graph.logic("NOT", unseen), collection)
+    graph.finish(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, SMALL))
+    return graph.tree
+
+
+def _thinned(graph: _Graph, geometry: Any, amount: Any) -> Any:
+    """Points without those that the amount leaves out; nothing is done where it leaves out none."""
+    fewer = graph.without(geometry, graph.less(amount, graph.random(0.0, 1.0, 1)))
+    return graph.choose("GEOMETRY", graph.less(amount, 1.0), geometry, fewer)
+
+
+def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scale: float) -> Any:
+    """Points at their places at the time, with their velocity."""
+    age, flight, drag = (graph.attribute(name) for name in (AGE, FLIGHT, DRAG))
+    time = graph.math("MINIMUM", age, flight)
+    left = graph.math("EXPONENT", graph.math("DIVIDE", graph.math("MULTIPLY", time, -1.0), drag))
+    passed = graph.math("MULTIPLY", drag, graph.math("SUBTRACT", 1.0, left))
+    launch = graph.attribute(LAUNCH, "FLOAT_VECTOR")
+    fall = graph.node("ShaderNodeCombineXYZ")
+    graph.link(graph.math("MULTIPLY", drag, -gravity / unit_scale), fall.inputs["Z"])
+    drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall.outputs["Vector"])
+    moved = graph.vector("ADD", graph.scaled(launch, passed), graph.scaled(drift, graph.math("SUBTRACT", time, passed)))
+    speed = graph.vector("ADD", graph.scaled(launch, left), graph.scaled(drift, graph.math("SUBTRACT", 1.0, left)))
+
+    born = graph.logic("NOT", graph.less(age, 0.0))
+    flies = graph.both(graph.less(age, flight), born)
+    blows = graph.less(0.0, graph.vector("LENGTH", wind, output="Value"))  # what has landed lies elsewhere for it
+    geometry = graph.store(geometry, VELOCITY, speed, flies, "FLOAT_VECTOR")
+    away = graph.either(flies, graph.both(blows, born))
+    return graph.put(geometry, away, graph.vector("ADD", graph.attribute(START, "FLOAT_VECTOR"), moved))
+
+
+def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
+    """The small ones as round points."""
+    points = graph.node("GeometryNodeMeshToPoints")
+    graph.link(geometry, points.inputs["Mesh"])
+    graph.link(graph.attribute(SMALL, "BOOLEAN"), points.inputs["Selection"])
+    graph.link(graph.attribute(RADIUS), points.inputs["Radius"])
+    shown = graph.node("GeometryNodeSetMaterial")
+    graph.link(points.outputs["Points"], shown.inputs["Geometry"])
+    shown.inputs["Material"].default_value = material
+    return shown.outputs["Geometry"]
+
+
+def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> Any:
+    """Some points as instances of shapes, which turn as long as they fly, and come to lie on their flat side."""
+    info = graph.node("GeometryNodeCollectionInfo")
+    info.inputs["Separate Children"].default_value = True
+    info.inputs["Reset Children"].default_value = True
+    graph.link(collection, info.inputs["Collection"])
+    time = graph.math("MINIMUM", graph.attribute(AGE), graph.attribute(FLIGHT))
+    left = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
+    heading = graph.random((0.0, 0.0, 0.0), (0.0, 0.0, 2 * pi), 4, "FLOAT_VECTOR")
+    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), left), heading)
+    on_points = graph.node("GeometryNodeInstanceOnPoints")
+    on_points.inputs["Pick Instance"].default_value = True
+    for source, socket in (
+        (geometry, "Points"),
+        (selection, "Selection"),
+        (info.outputs[0], "Instance"),
+        (graph.random(0, 100, 3, "INT"), "Instance Index"),
+        (turn, "Rotation"),
+        (graph.attribute(RADIUS), "Scale"),
+    ):
+        graph.link(source, on_points.inputs[socket])
+    return on_points.outputs["Instances"]
+
+
+class _Graph(NodeGraph):
+    """The debris' group, while it is built."""
+
+    def __init__(self) -> None:
+        super().__init__(new_group(GROUP, MARK))
+
+    def inputs(self, shapes: bpy.types.Collection) -> list[Any]:
+        """Geometry, wind, amount, how many are shaped, and shapes."""
+        interface = self.tree.interface
+        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        wind = interface.new_socket("Wind", in_out="INPUT", socket_type="NodeSocketVector")
+        wind.description = "Wind in metres per second, which carries the flying pieces along"
+        amount = interface.new_socket("Amount", in_out="INPUT", socket_type="NodeSocketFloat")
+        amount.default_value, amount.min_value, amount.max_value = 1.0, 0.0, 1.0
+        amount.description = "Share of the pieces that are shown"
+        shaped = interface.new_socket("Shaped", in_out="INPUT", socket_type="NodeSocketInt")
+        shaped.default_value, shaped.min_value = SHAPED, 0
+        shaped.description = "How many of the largest pieces have a shape; all others are round, and play much faster"
+        collection = interface.new_socket("Shapes", in_out="INPUT", socket_type="NodeSocketCollection")
+        collection.default_value = shapes
+        collection.description = "Objects of radius 1 for the large pieces, one picked for each"
+        group = self.node("NodeGroupInput")
+        return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
+
+    def less(self, first: Any, second: Any) -> Any:
+        """Whether one is less than the other."""
+        return self.compare("LESS_THAN", first, second)
+
+    def joined(self, *geometries: Any) -> Any:
+        node = self.node("GeometryNodeJoinGeometry")
+        for geometry in geometries:
+            self.link(geometry, node.inputs["Geometry"])
+        return node.outputs["Geometry"]
+
+    def random(self, low: Any, high: Any, seed: int, kind: str = "FLOAT") -> Any:
+        node = self.node("FunctionNodeRandomValue")
+        node.data_type = kind
+        sockets = [socket for socket in node.inputs if socket.enabled]
+        for name, value in (("Min", low), ("Max", high), ("Seed", seed)):
+            self.link(value, next(socket for socket in sockets if socket.name == name))
+        return next(socket for socket in node.outputs if socket.enabled)
+
+    def random_turn(self, seed: int) -> Any:
+        return self.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, seed, "FLOAT_VECTOR")
+
+    def without(self, geometry: Any, selection: Any) -> Any:
+        node = self.node("GeometryNodeDeleteGeometry")
+        node.domain = "POINT"
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        return node.outputs["Geometry"]

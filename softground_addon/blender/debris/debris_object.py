@@ -1,0 +1,315 @@
+"""The object `SoftGround Debris`: what the steps of a ground's bake throw, put there and taken away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core.debris import flight
+from ...core.debris.debris import Debris
+from ...core.ground import surfaces
+from ...core.settings import SceneUnits
+from .. import compat, mesh_arrays
+from ..drafts import none_left_if_it_fails
+from ..node_modifiers import inputs_of, modifier_with
+from ..settings import exists, find, name_of
+from . import debris_nodes as nodes
+from . import debris_shapes
+
+NAME = MODIFIER = nodes.GROUP
+THROWN, THROWN_BY = "softground_thrown", "softground_thrown_by"
+"""Properties of the ground, its debris, and of debris, its ground."""
+AWAY = "softground_away"
+"""Property of debris that is in no scene while its ground is deleted."""
+ORIGIN, MADE_FOR = "softground_origin", "softground_made_for"
+"""Properties of its points, where their origin was [Blender units], and of its node group, for what it was made."""
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """Pieces that lie on the ground.
+
+    Attributes
+    ----------
+    place : (N, 2) float array
+        [m]
+    radius : (N,) float array
+        [m]
+    landed : (N,) float array
+        Scene frame at which each came down.
+    """
+
+    place: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    landed: NDArray[np.float64]
+
+
+_AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0, "Shaped": nodes.SHAPED}
+
+
+def put(
+    ground: bpy.types.Object,
+    debris: Debris | None,
+    *,
+    surface: str,
+    units: SceneUnits,
+) -> bpy.types.Object | None:
+    """Let a ground have debris in place of what it may have; None takes that away.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    debris : Debris or None
+    surface : str
+    units : SceneUnits
+    """
+    left = [obj for obj in bpy.data.objects if _is_left_for(ground, obj)]
+    older = None
+    if debris is not None and len(debris.birth):
+        older = of(ground) or next(iter(left), None)
+    for owner in {ground, *map(_owner_of, left)}:
+        if owner.get(THROWN) != older:
+            remove(owner)
+    if debris is None or not len(debris.birth):
+        return None
+    before = _origin_of(older) if older else Vector()
+    follows = older is None or older.parent == _owner_of(older)  # or the user has given it another parent
+    origin = ground.matrix_world.translation if follows else before  # of both, or a line would be drawn between them
+    modifier: Any = _modifier_of(older) if older else None
+    with none_left_if_it_fails():
+        points = _points(debris, origin, units)
+        group = _group_for(modifier and modifier.node_group, surface, units)
+    obj = older or bpy.data.objects.new(NAME, points)
+    if older:
+        _owner_of(older).pop(THROWN, None)
+        _exchange(older, points)
+    obj[nodes.MARK], obj[THROWN_BY], ground[THROWN] = True, ground, obj
+    if follows:
+        obj.parent, obj.matrix_parent_inverse = ground, ground.matrix_world.inverted()
+        obj.location += origin - before
+    if not obj.users_collection:
+        _link(obj, ground)
+    _play(modifier or obj.modifiers.new(MODIFIER, "NODES"), group)
+    return obj
+
+
+def of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The debris of a ground's bake; none of a ground that is a duplicate."""
+    debris = ground.get(THROWN)
+    belongs = exists(debris) and debris.get(nodes.MARK) and _owner_of(debris) == ground
+    return debris if belongs else None
+
+
+def follow(ground: bpy.types.Object, *, is_deleted: bool) -> None:
+    """Take debris out of the scene while its ground is deleted, so that it hangs in no air, and back in after undo."""
+    debris = ground.get(THROWN)
+    if debris is None or _owner_of(debris) != ground:
+        return
+    if is_deleted and exists(debris):
+        debris[AWAY] = True
+        for collection in debris.users_collection:
+            collection.objects.unlink(debris)
+    elif not is_deleted and AWAY in debris.keys():  # noqa: SIM118  (an ID is no mapping)
+        _link(debris, ground)
+
+
+def _link(debris: bpy.types.Object, ground: bpy.types.Object) -> None:
+    debris.pop(AWAY, None)
+    for collection in ground.users_collection:
+        collection.objects.link(debris)
+
+
+def _owner_of(debris: bpy.types.Object) -> Any:
+    """The ground whose bake threw it."""
+    return debris.get(THROWN_BY)
+
+
+def _is_left_for(ground: bpy.types.Object, obj: bpy.types.Object) -> bool:
+    """True for debris that is away, or whose own ground was deleted; duplicates of it are the user's."""
+    owner = _owner_of(obj) if obj.get(nodes.MARK) else None
+    if owner is None or owner.get(THROWN) != obj:
+        return False
+    return not exists(owner) or (owner == ground and AWAY in obj.keys())  # noqa: SIM118  (an ID is no mapping)
+
+
+def _origin_of(debris: bpy.types.Object) -> Vector:
+    """Where the origin of its points is in the world, if the user has not moved it [Blender units]."""
+    return Vector(cast("bpy.types.Mesh", debris.data).get(ORIGIN, debris.matrix_parent_inverse.inverted().translation))
+
+
+def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
+    """An input of the debris as `layout.prop` takes it: its modifier and the path of the property."""
+    modifier = _modifier_of(obj)
+    return compat.input_field(modifier, inputs_of(modifier)[name]) if modifier else None
+
+
+def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, unit_scale: float) -> AtRest:
+    """Where the pieces of debris come to rest in the wind of the moment; those that never do are left out.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        From `of`.
+    frame_rate, time_stretch, unit_scale
+        As of `put`.
+    """
+    points: Any = obj.data
+    count, modifier = len(points.vertices), _modifier_of(obj)
+
+    def values(name: str) -> NDArray[np.float64]:
+        found = np.empty(count, np.float32)
+        points.attributes[name].data.foreach_get("value", found)
+        return found.astype(np.float64)
+
+    place = np.empty(count * 3, np.float32)
+    points.vertices.foreach_get("co", place)
+    time, drag = values(nodes.FLIGHT), values(nodes.DRAG)
+    wind = compat.read_input(modifier, inputs_of(modifier)["Wind"]) if modifier else None
+    drift = np.outer(time - flight.coasting(drag, time), tuple(wind or (0.0, 0.0, 0.0))[:2])
+    landed = values(nodes.BIRTH) / time_stretch + time * frame_rate
+    down = time < flight.LONGEST_FLIGHT - 1e-3
+    at = (place.reshape(-1, 3) + np.array(_origin_of(obj)))[:, :2] * unit_scale + drift
+    return AtRest(at[down], values(nodes.RADIUS)[down] * unit_scale, landed[down])
+
+
+class Pieces:
+    """The pieces of debris, of which some are not shown for a while.
+
+    Attributes
+    ----------
+    place : (N, 2) float array
+        Where they come to rest without wind [m].
+    step : (N,) int array
+        Number of the step that threw each.
+    """
+
+    def __init__(self, debris: bpy.types.Object, unit_scale: float) -> None:
+        points = cast("bpy.types.Mesh", debris.data)
+        at = mesh_arrays.positions(points).astype(np.float64) + np.array(_origin_of(debris))
+        self._name, self.place = name_of(debris), at[:, :2] * unit_scale
+        self._radius, self.step = np.empty(len(at), np.float32), np.empty(len(at), np.int32)
+        for name, values in ((nodes.RADIUS, self._radius), (nodes.STEP, self.step)):
+            cast("Any", points.attributes[name]).data.foreach_get("value", values)
+
+    def hide(self, hidden: NDArray[np.bool_]) -> None:
+        """Show all but some of them (N,)."""
+        if (debris := find(self._name)) is not None:
+            points = cast("bpy.types.Mesh", debris.data)
+            radius: Any = points.attributes[nodes.RADIUS]
+            radius.data.foreach_set("value", np.where(hidden, np.float32(0.0), self._radius))
+            points.update()
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take a ground's debris away; nothing happens where there is none."""
+    obj = ground.pop(THROWN, None)
+    if obj is not None and obj.get(nodes.MARK) and _owner_of(obj) == ground:
+        mesh: Any = obj.data
+        bpy.data.objects.remove(obj)
+        if mesh is not None and not mesh.users:
+            bpy.data.meshes.remove(mesh)
+        _remove_unused()
+
+
+def _remove_unused() -> None:
+    """Remove the groups and shapes that no debris has any more."""
+    for group in [one for one in bpy.data.node_groups if one.get(nodes.MARK) and not one.users]:
+        bpy.data.node_groups.remove(group)
+    for shapes in [one for one in bpy.data.collections if one.get(nodes.MARK) and not one.users]:
+        debris_shapes.remove(shapes)
+
+
+def _exchange(debris: bpy.types.Object, points: bpy.types.Mesh) -> None:
+    """Give debris new points, under the name of its own; its materials, and all else that the user did to it, stay."""
+    old: Any = debris.data
+    for material in old.materials:
+        points.materials.append(material)
+    name = old.name
+    old.user_remap(points)  # also of linked duplicates
+    bpy.data.meshes.remove(old)
+    points.name = name
+
+
+def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
+    """The node group that debris has, or a new one if it is for another surface or other units."""
+    made_for = f"{surface} {units.frame_rate} {units.time_stretch} {units.gravity_m_s2} {units.unit_scale_m}"
+    if group and group.get(MADE_FOR) == made_for:
+        return group
+    shapes = group and _shapes_of(group)
+    if shapes is None or shapes.get(nodes.MARK) != surface:
+        shapes = debris_shapes.collection_of(surfaces.find(surface))
+    group = nodes.build(
+        frame_rate=units.frame_rate * units.time_stretch,
+        gravity=units.gravity_m_s2,
+        unit_scale=units.unit_scale_m,
+        shapes=shapes,
+        material=debris_shapes.material_of(shapes),
+    )
+    group[MADE_FOR] = made_for
+    return group
+
+
+def _shapes_of(group: Any) -> Any:
+    """The shapes that a group has unless others are chosen."""
+    return next(item for item in group.interface.items_tree if item.name == "Shapes").default_value
+
+
+def _play(modifier: Any, group: Any) -> None:
+    """Have debris play a group, with what the artist has set."""
+    if modifier.node_group == group:
+        return
+    values = _AT_FIRST | {"Shapes": _shapes_of(group)} | (_settings_of(modifier) if modifier.node_group else {})
+    modifier.node_group = group
+    sockets = inputs_of(modifier)
+    for name, value in values.items():
+        compat.write_input(modifier, sockets[name], value)
+    _remove_unused()
+
+
+def _settings_of(modifier: Any) -> dict[str, Any]:
+    """What the artist set of the older debris: wind, amount, how many are shaped, and shapes of their own."""
+    sockets = inputs_of(modifier)
+    values = {name: compat.read_input(modifier, sockets[name]) for name in (*_AT_FIRST, "Shapes")}
+    if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):
+        values["Shapes"] = None
+    # Vectors belong to the modifier, and go with it.
+    values["Wind"] = None if values["Wind"] is None else tuple(values["Wind"])
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _modifier_of(obj: bpy.types.Object) -> Any:
+    return modifier_with(obj, lambda group: bool(group.get(nodes.MARK)))
+
+
+def _points(debris: Debris, origin: Vector, units: SceneUnits) -> bpy.types.Mesh:
+    """Points where the pieces come to rest as seen from an origin [Blender units], with what lets them fly there."""
+    unit_scale, time_stretch = units.unit_scale_m, units.time_stretch
+    start = debris.start - np.array(origin) * unit_scale
+    rest = flight.position(start, debris.velocity, debris.drag_time, debris.time, units.gravity_m_s2)
+    rank = np.empty(len(debris.radius))
+    rank[np.argsort(-debris.radius, kind="stable")] = np.arange(len(rank))
+    order = np.argsort(rank >= nodes.SHAPED, kind="stable")  # then what is seen is one run of points, copied as such
+    points = bpy.data.meshes.new(NAME)
+    points[ORIGIN] = origin[:]
+    points.vertices.add(len(debris.birth))
+    points.vertices.foreach_set("co", (rest / unit_scale)[order].astype(np.float32).ravel())
+    columns: tuple[tuple[str, Any, str, Any], ...] = (
+        (nodes.BIRTH, "FLOAT", "value", debris.birth * time_stretch),
+        (nodes.FLIGHT, "FLOAT", "value", debris.time),
+        (nodes.DRAG, "FLOAT", "value", debris.drag_time),
+        (nodes.RADIUS, "FLOAT", "value", debris.radius / unit_scale),
+        (nodes.RANK, "FLOAT", "value", rank),
+        (nodes.START, "FLOAT_VECTOR", "vector", start / unit_scale),
+        (nodes.LAUNCH, "FLOAT_VECTOR", "vector", debris.velocity / unit_scale),
+        (nodes.KIND, "INT", "value", debris.kind),
+        (nodes.STEP, "INT", "value", debris.step),
+    )
+    for name, kind, field, values in columns:
+        attribute: Any = points.attributes.new(name, kind, "POINT")
+        attribute.data.foreach_set(field, values[order].astype(np.int32 if kind == "INT" else np.float32).ravel())
+    return points

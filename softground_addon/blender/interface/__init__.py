@@ -1,1 +1,0 @@
-"""What the user sees and presses: operators, panels, menus and the overlay."""

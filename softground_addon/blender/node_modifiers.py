@@ -1,0 +1,45 @@
+"""Node groups of ours and the modifiers that run them, found and read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+
+
+def new_group(name: str, mark: str) -> Any:
+    """A new, empty group for a modifier, with a custom property by which it is known whatever the user calls it."""
+    tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.is_modifier = True
+    tree[mark] = True
+    return tree
+
+
+def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:
+    """The first modifier whose node group is of a kind, whatever the names of both have become; None without one."""
+    return next((one for one in obj.modifiers if (group := getattr(one, "node_group", None)) and is_it(group)), None)
+
+
+def inputs_of(modifier: Any) -> dict[str, str]:
+    """Identifier of each input of a modifier's node group, by its name."""
+    sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
+    return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
+
+
+def nodes_of(modifier: Any) -> list[Any]:
+    """The nodes of a modifier's group and of all groups within; none of a modifier without a group."""
+    waiting, known, nodes = [getattr(modifier, "node_group", None)], set(), []
+    while waiting:
+        tree = waiting.pop()
+        if tree is not None and tree not in known:
+            known.add(tree)
+            nodes += tree.nodes
+            waiting += [getattr(node, "node_tree", None) for node in tree.nodes]
+    return nodes
+
+
+def named_by_nodes(modifier: Any) -> Iterator[Any]:
+    """The objects and collections that the nodes of a modifier's group name, or None."""
+    sockets = (socket for node in nodes_of(modifier) for socket in node.inputs)
+    return (socket.default_value for socket in sockets if socket.type in ("OBJECT", "COLLECTION"))

@@ -1,0 +1,1 @@
+"""The operators behind the buttons, most of them jobs with a bar and Esc."""

@@ -1,0 +1,75 @@
+"""*Add Weather*: snow, thaw, wind, rain and sun over what is baked, as a modifier whose sliders act at once."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty
+
+from ...core.errors import InputError
+from .. import jobs, session, settings
+from ..ground import baked_ground, ground_checks
+from ..operator_base import OnBake, reports_errors
+from ..playback import weather_modifier
+from ..weather import ground_weather as weather
+from ..weather import weather_result
+from .modal_bake import Reading, Reports
+
+NONE = "NONE"
+_CHOICES = [
+    (NONE, "None", "A shot of eight hours: set the sliders. Weather that is there already keeps its values"),
+    *((key, title, f"Set the sliders to {title}") for key, (title, _) in weather.PRESETS.items()),
+]
+
+
+class SOFTGROUND_OT_add_weather(OnBake, Reading):
+    """Let weather act on the baked prints: snow covers and rounds them, warmth melts them, wind fills them, rain
+    stands in them. A modifier after the playback, whose sliders act at once, with no new bake. Esc cancels"""
+
+    bl_idname = "softground.add_weather"
+    bl_label = "Add Weather"
+
+    preset: EnumProperty(name="Preset", description="Weather to start with", items=_CHOICES, default=NONE)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if there is a bake, and no other job runs."""
+        return super().poll(context) and Reading.poll.__func__(cls, context)
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        if session.current().is_live:
+            raise InputError("Live mode is on, and weather acts on prints that stay: press Keep, then add weather.")
+        ground_checks.check_playable(baked_ground.display_mesh_of(scene.softground.ground))
+        return _added(scene, "" if self.preset == NONE else self.preset)
+
+
+def _added(scene: bpy.types.Scene, preset: str) -> jobs.Job[Reports]:
+    is_new = weather_result.modifier_of(scene) is None
+    yield from weather.adding(scene.softground.ground, preset=preset)
+    if is_new and not preset:
+        weather_result.set_hours(scene, weather_result.NIGHT)
+    return []
+
+
+class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
+    """Remove the weather from the ground; the bake stays as it is"""
+
+    bl_idname = "softground.remove_weather"
+    bl_label = "Remove Weather"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is weather on the scene's ground."""
+        ground = settings.options_of(context).ground
+        cls.poll_message_set("There is no weather on the ground")
+        return ground is not None and weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) is not None
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        display_mesh = baked_ground.display_mesh_of(settings.options_of(context).ground)
+        ground_checks.check_playable(display_mesh)
+        weather_modifier.remove(display_mesh)
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_add_weather, SOFTGROUND_OT_remove_weather)

@@ -1,0 +1,54 @@
+"""What the sidebar's panels have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .. import session
+
+CATEGORY = "SoftGround"
+"""The sidebar's tab."""
+
+
+ADVANCED = "SOFTGROUND_PT_advanced"
+"""The panel that holds all that is not on the first screen."""
+
+
+class SidebarPanel:
+    """A panel in the add-on's tab, in Blender's property style."""
+
+    bl_space_type: Any = "VIEW_3D"
+    bl_region_type: Any = "UI"
+    bl_category = CATEGORY
+
+    layout: Any
+
+    def fields(self) -> Any:
+        """The layout for fields; greyed while a bake runs."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.enabled = not session.current().is_baking
+        return layout
+
+
+class AdvancedPanel(SidebarPanel):
+    """A panel that is not on the first screen."""
+
+    bl_parent_id = ADVANCED
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+
+class Listed(bpy.types.UIList):
+    """A list of which each row is drawn by `draw_row`."""
+
+    def draw_item(
+        self, _c: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+    ) -> None:
+        self.draw_row(layout, item)
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        """Draw an item of the list."""
+        raise NotImplementedError

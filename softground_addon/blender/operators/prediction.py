@@ -1,0 +1,199 @@
+"""What panels and the overlay tell of a bake before there is one.
+
+Nothing is computed while they are drawn: what has changed is worked out right after, and until then they show what they
+knew last.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+
+import bpy
+
+from ...core.composers.prediction import matching_modulus, next_modulus
+from ...core.errors import InputError
+from ...core.settings import BakeSettings
+from .. import jobs, session, settings
+from ..live import live
+from ..reading import analysis
+from ..reading.analysis import Analysis
+from ..state import state
+
+SOON = 0.03
+"""Time from the drawing that finds something changed until it is worked out anew [s]."""
+
+PART = 0.025
+"""What is worked on before Blender has its turn again, beside the step that is being done when it is over [s]."""
+PAUSE = 0.005
+"""Time that Blender has until it is gone on [s]."""
+
+_ENDED = object()
+
+CLOSE_ENOUGH = 0.005
+"""Relative error of a depth that was typed."""
+TRIALS = 6
+"""Moduli that are tried for it."""
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """A depth that was typed [m], the modulus that was set for it [Pa], and those tried before, with their depths."""
+
+    depth: float
+    modulus: float
+    tried: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class DepthPrediction:
+    """What is known of a bake to come.
+
+    Attributes
+    ----------
+    analysis : Analysis
+        The shot; masses and force models may have changed since.
+    depth : float or None
+        Of the typical print to expect [m], as it was known last.
+    is_current : bool
+        Whether nothing has changed since.
+    """
+
+    analysis: Analysis
+    depth: float | None
+    is_current: bool
+
+
+def of(scene: bpy.types.Scene) -> DepthPrediction | None:
+    """The prediction for a scene whose shot is known; to be shown, and worked out soon where it is outdated."""
+    return _look(scene)[1]
+
+
+def asked(scene: bpy.types.Scene) -> BakeSettings:
+    """The settings of a scene as panels and overlay are drawn."""
+    return _look(scene)[0]
+
+
+def look_anew() -> None:
+    """Forget what was seen; for a timer, with which Blender's next turn begins."""
+    state.seen.clear()
+
+
+def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]:
+    """Look once in a turn."""
+    if not bpy.app.timers.is_registered(look_anew):
+        state.seen.clear()
+        if not bpy.app.background:  # where there are no turns
+            bpy.app.timers.register(look_anew, persistent=True)
+    if scene.session_uid not in state.seen:
+        wanted = settings.snapshot(scene)
+        state.seen[scene.session_uid] = wanted, _prediction(scene, wanted)
+    seen: tuple[BakeSettings, DepthPrediction | None] = state.seen[scene.session_uid]
+    return seen
+
+
+def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction | None:
+    known = analysis.known(scene, wanted)
+    if known is None:
+        return None
+    depth = analysis.known_depth(known, wanted)
+    if depth is None:
+        if not bpy.app.timers.is_registered(_work_out):
+            bpy.app.timers.register(_work_out, first_interval=SOON)
+        return DepthPrediction(known, state.told.get(scene.session_uid), is_current=False)
+    state.told[scene.session_uid] = depth
+    return DepthPrediction(known, depth, is_current=True)
+
+
+def shown_cm(scene: bpy.types.Scene) -> float:
+    """The depth that the scene was told last [cm]; 0 before."""
+    return (state.told.get(scene.session_uid) or 0.0) * 100
+
+
+def type_cm(scene: bpy.types.Scene, depth: float) -> None:
+    """Set the stiffness so that the typical print gets a depth [cm]; says why where none gives it."""
+    known = analysis.current(scene)
+    if known is None or not depth > 0:
+        return
+    wanted = settings.snapshot(scene)
+    try:
+        if bpy.app.background or depth / 100 > wanted.material.deepest or not state.told.get(scene.session_uid):
+            modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
+            scene.softground.material.youngs_modulus = modulus
+        else:
+            aim_at(scene, depth / 100)
+    except InputError as error:
+        message = str(error)
+        if not bpy.app.background:
+            bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
+
+
+def aim_at(scene: bpy.types.Scene, depth: float) -> None:
+    """Set the stiffness so that the typical print gets about a depth [m]; it is put right as the depth is worked out.
+
+    So a drag is answered at once.
+    """
+    material = scene.softground.material
+    material.youngs_modulus = next_modulus([(material.youngs_modulus, state.told[scene.session_uid])], depth)
+    state.told[scene.session_uid] = depth
+    state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
+
+
+def _aim_of(scene: bpy.types.Scene) -> _Aim | None:
+    """The depth that was typed last, taken away; None where the stiffness was set otherwise since."""
+    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
+    return aim if aim and scene.softground.material.youngs_modulus == aim.modulus else None
+
+
+def _put_right(scene: bpy.types.Scene) -> bool:
+    """Bring the stiffness nearer to what gives the depth that was typed last; whether there is more to do."""
+    aim, material = _aim_of(scene), scene.softground.material
+    depth = analysis.known_depth(known, settings.snapshot(scene)) if (known := analysis.known(scene)) else None
+    if aim is None or not depth or len(aim.tried) == TRIALS:
+        return False
+    if abs(depth - aim.depth) <= CLOSE_ENOUGH * aim.depth:
+        return False
+    tried = (*aim.tried, (aim.modulus, depth))
+    material.youngs_modulus = next_modulus(tried, aim.depth)
+    state.aims[scene.session_uid] = _Aim(aim.depth, material.youngs_modulus, tried)
+    return True
+
+
+def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
+    """Set the stiffness for the depth that was typed last, where the search for it has not ended, as a bake begins."""
+    aim, known = _aim_of(scene), analysis.known(scene)
+    if aim is None or known is None:
+        return
+    wanted = settings.snapshot(scene)
+    search = matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)
+    with suppress(InputError):  # the stiffness that comes nearest stays
+        modulus = yield from jobs.meanwhile(jobs.Progress("sample", 0.0), search)
+        scene.softground.material.youngs_modulus = modulus
+
+
+def _work_out() -> float | None:
+    """Bring the predictions that are shown up to date, after live mode's prints."""
+    if live.is_answering():
+        return SOON
+    if not state.predicting:
+        scenes = {window.scene for window in bpy.context.window_manager.windows}
+        state.predicting.extend(analysis.working_out_depth(scene) for scene in scenes if analysis.known(scene))
+    until = time.perf_counter() + PART
+    while state.predicting:
+        if next(state.predicting[-1], _ENDED) is _ENDED:
+            state.predicting.pop()
+        elif time.perf_counter() > until and not bpy.app.background:
+            return PAUSE
+    more = [_put_right(scene) for scene in {window.scene for window in bpy.context.window_manager.windows}]
+    session.redraw()
+    if session.current().show_overlay:
+        session.redraw(region_type="WINDOW")
+    return PAUSE if any(more) else None
+
+
+def unregister() -> None:
+    """Work nothing out any more."""
+    for timer in (_work_out, look_anew):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

@@ -1,0 +1,306 @@
+"""What the buttons do. Each operator is thin: it calls one function, and its errors become a report."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty
+
+from ...batch.manifest import BatchShot
+from ...batch.shell import command_line
+from ...core.errors import InputError
+from ...core.ground import surfaces
+from .. import jobs, session, settings
+from ..animation_layer.constraint_layer import LayerKind
+from ..baking.scene_findings import shape_findings
+from ..characters import character_setup, recognition, selection
+from ..command_line import program
+from ..ground import baked_ground, ground_checks, ground_mesh, look
+from ..ground.created_ground import create_ground, laid_out, select
+from ..operator_base import reports_errors
+from ..reading import analysis, shots
+from ..response import response_job
+from ..rigs import frame_ranges
+from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
+from .modal_bake import Reading, Reports
+
+
+class SOFTGROUND_OT_add_character(Reading):
+    """Add the selected characters: feet, hips and limbs are recognised from the skin, the bone names or the rest
+    pose. Selected objects without a rig are added as props that fall, roll or slide. Esc cancels"""
+
+    bl_idname = "softground.add_character"
+    bl_label = "Add Character"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        return _added(scene, bpy.context.active_object, list(bpy.context.selected_objects))
+
+
+def _added(
+    scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]
+) -> jobs.Job[Reports]:
+    """Add what is selected, and read the shot for its prediction; the reports of it, each with its kind."""
+    options = scene.softground
+    before = len(options.characters), options.active_character, options.frame_start, options.frame_end
+    fresh, material = settings.untouched(options), options.material
+    sizes = [(options, "cell_size"), (options, "cells_along_sole"), (options, "length_scale")]
+    sizes += [(material, "rim_reach"), (material, "blur_sigma")]
+    fitted = [(group, field, getattr(group, field)) for group, field in sizes]
+    stays = False
+    try:
+        reports = yield from _add(scene, active, selected)
+        yield jobs.Progress("sample", recognition.SHARE)
+        yield from _read_for_prediction(scene)
+        stays = True
+    finally:
+        if not stays:
+            while len(options.characters) > before[0]:
+                options.characters.remove(len(options.characters) - 1)
+            options.active_character, options.frame_start, options.frame_end = before[1:]
+            for group, field, value in fitted:
+                setattr(group, field, value)
+            for group, field in fresh:
+                group.property_unset(field)
+    return reports
+
+
+def _read_for_prediction(scene: bpy.types.Scene) -> jobs.Job[None]:
+    """Read the shot where there is a panel to show its prediction, if it can be read."""
+    if not bpy.app.background:
+        with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+            yield from analysis.reading(scene)
+
+
+def _add(
+    scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]
+) -> jobs.Job[Reports]:
+    rigs, props = selection.chosen(scene, active, selected)
+    reports: Reports = []
+    for name in [settings.name_of(rig) for rig in rigs]:
+        character = yield from character_setup.adding_character(scene, settings.found(name))
+        soles = ", ".join(sole.name for sole in character.soles)
+        if soles:
+            reports.append(("INFO", f"Added '{character.name}' with {soles}"))
+        else:
+            reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
+    added = character_setup.add_props(scene, props) if props else []
+    if added:
+        reports.append(("INFO", "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)))
+    for obj in props:
+        if changing := shape_findings([obj]):
+            reports.append(("WARNING", changing[0].text))
+        elif not selection.moves(obj):
+            reports.append(("WARNING", f"'{obj.name}' does not move: give it keys or a rigid body before you bake"))
+    return reports
+
+
+class SOFTGROUND_OT_use_as_ground(Reading):
+    """Take the selected mesh as the ground, as it is: flat, sculpted or sloped. Esc cancels"""
+
+    bl_idname = "softground.use_as_ground"
+    bl_label = "Use Selected as Ground"
+    cancelled = "Use Selected cancelled: nothing was changed"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a mesh is selected that may be the ground."""
+        if not super().poll(context):
+            return False
+        cls.poll_message_set("Select the mesh to walk on, not a character")
+        return _selected_ground(context) is not None or _selected_instance(context) is not None
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        _check_no_instance(bpy.context)
+        chosen = _selected_ground(bpy.context)
+        assert chosen is not None
+        return _taken_as_ground(scene, chosen)
+
+
+def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.Job[Reports]:
+    """Take a mesh as the ground, and read the shot for its prediction."""
+    ground_checks.check_usable(chosen)
+    options, before = scene.softground, scene.softground.ground
+    kept = settings.name_of(before) if before else None
+    stays = False
+    try:
+        options.ground = chosen
+        reports: Reports = [("INFO", f"'{chosen.name}' is now the ground")]
+        yield jobs.Progress("sample", 0.0)
+        if options.characters:
+            yield from _read_for_prediction(scene)
+        stays = True
+    finally:
+        if not stays:
+            options.ground = settings.find(kept) if kept else None
+    return reports
+
+
+class SOFTGROUND_OT_create_ground(Reading):
+    """Create a ground that fits the walk: fine where feet come down, coarse elsewhere. Esc cancels"""
+
+    bl_idname = "softground.create_ground"
+    bl_label = "Create Ground"
+
+    use_selected: BoolProperty(
+        name="Use Selected", description="Use the selected mesh as it is, if one is selected", default=True
+    )
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        if self.use_selected:
+            _check_no_instance(bpy.context)
+            if chosen := _selected_ground(bpy.context):
+                return _taken_as_ground(scene, chosen)
+        return _created(scene)
+
+
+def _created(scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    wanted = shots.settings_of(scene)
+    plan = yield from shots.fit_ground(scene, wanted)
+    layout = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), laid_out(wanted, plan))
+    with analysis.own_changes(scene):
+        ground = create_ground(scene, wanted, layout)
+    select(scene, ground)
+    text = f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices"
+    return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
+
+
+def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a selected instance of a collection with meshes."""
+    obj = context.active_object
+    return obj if obj is not None and obj.select_get() and instances_mesh(obj) else None
+
+
+def _check_no_instance(context: bpy.types.Context) -> None:
+    if obj := _selected_instance(context):
+        raise InputError(
+            f"'{obj.name}' is a collection instance, which takes no prints: make it real (Object > Apply > "
+            "Make Instances Real), select the mesh to walk on, and press Use Selected."
+        )
+
+
+def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a selected mesh that no character wears or carries and that does not print itself."""
+    obj = context.active_object
+    if obj is None or obj.type != "MESH" or not obj.select_get() or obj.find_armature():
+        return None
+    characters = settings.options_of(context).characters
+    above = frame_ranges.ancestors(obj)
+    belongs = any(one.armature in above or any(sole.object == obj for sole in one.soles) for one in characters)
+    return None if belongs else obj
+
+
+class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
+    """Remove the footprints from the ground and the response from the characters, as if there had been no bake"""
+
+    bl_idname = "softground.clear_bake"
+    bl_label = "Clear Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene.softground):
+            cls.poll_message_set("There is no bake on the ground")
+            return False
+        if session.current().is_live:
+            cls.poll_message_set("Live mode is on: press Keep or Discard first")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        with analysis.own_changes(scene):
+            if ground is not None:
+                if baked_ground.has_remains(ground):
+                    baked_ground.clear(ground)
+                look.take_off(ground)
+            response_job.remove_layers(scene, LayerKind.RESPONSE)
+        response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
+        if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on
+            scene.softground.grounding.use = scene.softground.grounding.by_button = False
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_apply_look(bpy.types.Operator):
+    """Show the preset's look in the prints, over copies of your own materials. Clear Bake removes it"""
+
+    bl_idname = "softground.apply_look"
+    bl_label = "Apply Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is a ground."""
+        cls.poll_message_set("Choose a ground first, or bake one")
+        return settings.exists(settings.options_of(context).ground)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        options = scene.softground
+        ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
+        with analysis.own_changes(scene):
+            mixed = look.apply(options.ground, options.material.surface)
+        theirs = f", over {mixed} of your materials" if mixed else ""
+        label = surfaces.find(options.material.surface).label.lower()
+        self.report({"INFO"}, f"'{options.ground.name}' now looks like {label}{theirs}")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
+    """Copy a command line that bakes the saved file into a new file beside it, for a terminal or a farm"""
+
+    bl_idname = "softground.copy_bake_command"
+    bl_label = "Copy Bake Command"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether the file on disk is the one that is open."""
+        if not bpy.data.filepath:
+            cls.poll_message_set("Save the file first: the command bakes it from there")
+            return False
+        if bpy.data.is_dirty and not bpy.app.background:  # in background it always is
+            cls.poll_message_set("Save your changes first: the command bakes the file as it is saved")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = bake_command(settings.scene_of(context))
+        self.report({"INFO"}, "Copied the command that bakes this shot")
+        return {"FINISHED"}
+
+
+def bake_command(scene: bpy.types.Scene) -> str:
+    """The command line that bakes a scene of the saved file into `NAME-baked.blend` beside it.
+
+    Raises
+    ------
+    InputError
+        If a name in it cannot be typed.
+    """
+    shot = Path(bpy.data.filepath)
+    bake = BatchShot(
+        name=shot.stem,
+        file=shot,
+        scene=scene.name if len(bpy.data.scenes) > 1 else "",
+        save=shot.with_name(f"{shot.stem}-baked.blend"),
+    )
+    return command_line(program.worker_command(shot, bake.options), windows=os.name == "nt")
+
+
+CLASSES = (
+    SOFTGROUND_OT_add_character,
+    SOFTGROUND_OT_use_as_ground,
+    SOFTGROUND_OT_create_ground,
+    SOFTGROUND_OT_clear_bake,
+    SOFTGROUND_OT_apply_look,
+    SOFTGROUND_OT_copy_bake_command,
+)

@@ -1,0 +1,130 @@
+"""The sidebar's list of contacts that Clean Feet holds in a way of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.errors import InputError
+from .. import settings
+from ..operator_base import reports_errors
+from ..operators.character_editing import active_character
+from ..operators.panel_base import Listed, SidebarPanel
+
+
+def active_hold(character: Any) -> Any:
+    """The foot lock that is chosen in a character's list, or None."""
+    number = character.active_hold if character else -1
+    return character.holds[number] if 0 <= number < len(character.holds) else None
+
+
+class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
+    """Lock the contact at the current frame: of the selected bone's foot, or else of the foot that is lowest"""
+
+    bl_idname = "softground.add_foot_lock"
+    bl_label = "Add Foot Lock"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character with an armature is chosen."""
+        cls.poll_message_set("Choose a character with an armature first")
+        character = active_character(settings.options_of(context))
+        return bool(character and settings.exists(character.armature))
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        character = active_character(scene.softground)
+        assert character is not None
+        foot = _foot_at_hand(character, context.active_pose_bone)
+        hold = character.holds.add()
+        hold.foot, hold.frame = foot, scene.frame_current
+        character.active_hold = len(character.holds) - 1
+        return {"FINISHED"}
+
+
+def _foot_at_hand(character: Any, chosen: bpy.types.PoseBone | None) -> str:
+    """The name of the foot that a bone belongs to, or else of the one that is lowest now."""
+    armature = character.armature
+    bones = armature.pose.bones
+    feet = [sole for sole in character.soles if not sole.object and sole.bone in bones]
+    if not feet:
+        raise InputError(f"'{armature.name}' has no foot with a bone: choose its bones in Advanced > Contacts.")
+    names = {name: sole.name for sole in feet for name in (sole.bone, sole.toe_bone)}
+    if chosen is not None and chosen.id_data == armature and chosen.name in names:
+        return names[chosen.name]
+
+    def height(sole: Any) -> float:
+        bone = bones[sole.bone]
+        return float(min((armature.matrix_world @ end).z for end in (bone.head, bone.tail)))
+
+    return str(min(feet, key=height).name)
+
+
+class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
+    """Take the chosen foot lock out of the list: its contact is locked like all others"""
+
+    bl_idname = "softground.remove_foot_lock"
+    bl_label = "Remove Foot Lock"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether one is chosen."""
+        cls.poll_message_set("Select a foot lock in the list first")
+        return active_hold(active_character(settings.options_of(context))) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        character = active_character(settings.options_of(context))
+        character.holds.remove(character.active_hold)
+        character.active_hold = max(0, min(character.active_hold, len(character.holds) - 1))
+        return {"FINISHED"}
+
+
+class SOFTGROUND_UL_foot_locks(Listed):
+    """Foot locks by frame, each with its foot and what it locks."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        row = layout.row()
+        row.label(text=f"{item.foot}  {item.frame}", icon="LOCKED", translate=False)
+        row.prop(item, "mode", text="", emboss=False)
+
+
+class SOFTGROUND_PT_foot_locks(SidebarPanel, bpy.types.Panel):
+    """Contacts that Clean Feet locks in another way than the rest; press Clean Feet again after a change"""
+
+    bl_label = "Foot Locks"
+    bl_parent_id = "SOFTGROUND_PT_response"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        character = active_character(settings.options_of(context))
+        row = layout.row()
+        row.template_list(
+            "SOFTGROUND_UL_foot_locks", "", character, "holds", character, "active_hold", rows=2, maxrows=6
+        )
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_foot_lock", text="", icon="ADD")
+        buttons.operator("softground.remove_foot_lock", text="", icon="REMOVE")
+        hold = active_hold(character)
+        if hold is None:
+            return
+        column = layout.column()
+        column.prop_search(hold, "foot", character, "soles")
+        column.prop(hold, "frame")
+        column.prop(hold, "mode")
+        column.prop(hold, "strength", slider=True)
+        ease = layout.column(align=True)
+        ease.prop(hold, "ease_in")
+        ease.prop(hold, "ease_out", text="Out")
+
+
+CLASSES = (
+    SOFTGROUND_OT_add_foot_lock,
+    SOFTGROUND_OT_remove_foot_lock,
+    SOFTGROUND_UL_foot_locks,
+    SOFTGROUND_PT_foot_locks,
+)

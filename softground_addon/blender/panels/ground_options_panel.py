@@ -1,0 +1,171 @@
+"""The sidebar's part on the ground's physics, its layers, what is painted on it, and its mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.composers.relief_plan import IMAGE
+from ...core.loads.cell_limits import Coverage, Fineness, duration
+from .. import settings
+from ..debris import debris_object
+from ..ground import painted_ground
+from ..operators import prediction
+from ..operators.character_editing import active_character
+from ..operators.panel_base import AdvancedPanel, SidebarPanel
+
+
+class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
+    """How prints look from close by, and what steps throw"""
+
+    bl_label = "Look of Prints"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+    bl_order = 1
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options = settings.options_of(context)
+        column = layout.column()
+        column.prop(options, "relief")
+        amount = column.row()
+        amount.active = options.relief != "OFF"
+        amount.prop(options, "relief_strength", text="Amount")
+        predicted = prediction.of(scene)
+        if predicted:
+            row = column.row()
+            row.active = False
+            text = estimate(predicted.analysis.coverage, prediction.asked(scene).fineness)
+            row.label(text=text, icon="TIME", translate=False)
+        if options.relief == "CLOSE_UP":
+            column.prop(options, "relief_vertices")
+            if predicted:
+                row = column.row()
+                row.active = False
+                fine = prediction.asked(scene).fineness
+                text = vertices(predicted.analysis.coverage.vertices(fine), options.relief_vertices)
+                row.label(text=text, icon="INFO", translate=False)
+        column.prop(options, "tread_mm")
+        column.prop(options, "tread_pattern")
+        if options.tread_pattern == IMAGE:
+            column.template_ID(options, "tread_image", open="image.open")
+        column.prop(options, "debris")
+        if options.debris and options.ground is not None:
+            _wind(column, options.ground)
+
+
+class SOFTGROUND_PT_material(AdvancedPanel, bpy.types.Panel):
+    """How the ground gives way"""
+
+    bl_label = "Realism"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options, character = scene.softground, active_character(scene.softground)
+        if character:
+            layout.prop(character, "force_model")
+        column = layout.column()
+        column.prop(options, "pressure")
+        for field in ("stiffness_mpa", "poisson_ratio", "rim_reach_cm", "rim_bias", "repose_angle"):
+            column.prop(options.material, field)
+        for field in ("characteristic_time", "shortest_time"):
+            column.prop(options.material, field)
+        layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
+
+
+class SOFTGROUND_PT_layers(AdvancedPanel, bpy.types.Panel):
+    """Depth of the loose layer, its crust, the firm ground below it, and how it gives way"""
+
+    bl_label = "Layers"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.fields().column()
+        material = settings.options_of(context).material
+        for field in ("layer_depth_cm", "crust_stress_kpa", "firm_depth_cm", "hardening", "exponent"):
+            column.prop(material, field)
+        row = column.row(heading="Densest Packing")
+        row.prop(material, "packs", text="")
+        packing = row.row()
+        packing.active = material.packs
+        packing.prop(material, "densest", text="")
+        for field in ("edge_width_cm", "spread", "cohesionless"):
+            column.prop(material, field)
+
+
+class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
+    """Vertex groups or float attributes that vary the ground from place to place"""
+
+    bl_label = "Masks"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return settings.options_of(context).ground is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.fields().column()
+        options = settings.options_of(context)
+        for field in ("stiffness", "layer_depth", "rim"):
+            row = column.row()
+            row.active = painted_ground.is_there(options.ground, getattr(options.painted, field))
+            row.prop(options.painted, field, icon="GROUP_VERTEX")
+
+
+class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
+    """How fine the ground is, and what it looks like"""
+
+    bl_label = "Mesh and Look"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options = scene.softground
+        column = layout.column()
+        column.prop(options.material, "surface")
+        column.operator("softground.apply_look", icon="MATERIAL")
+        column.prop(options, "cell_size_cm")
+        column.prop(options, "longest_bake")
+        column.prop(options.material, "blur_sigma_cm")
+        column.prop(options, "detail")
+        column.prop(options, "ground_margin")
+        column.prop(options, "shape_keys")
+        row = column.row()
+        row.active = options.shape_keys
+        row.prop(options, "dense_shape_keys")
+
+
+def vertices(wanted: float, most: int) -> str:
+    """Vertices of a close-up along all of a trail, and if there may be fewer."""
+    text = f"About {rounded(wanted):,.0f} vertices along the whole trail"
+    return text if wanted <= most else f"{text}, over Max Vertices"
+
+
+def estimate(coverage: Coverage, fine: Fineness) -> str:
+    """Cells that a bake changes, and the memory and time that it takes."""
+    cells, (memory, time) = coverage.cells(fine.cell_size, fine.rim_reach), coverage.bake_costs(fine)
+    return f"About {rounded(cells):,.0f} cells, {rounded(memory / 1e6):,.0f} MB, {duration(time)}"
+
+
+def rounded(value: float) -> float:
+    """A positive number to two digits, at least 1, as estimates are told."""
+    return max(1.0, float(f"{value:.2g}"))
+
+
+def _wind(layout: Any, ground: Any) -> None:
+    """What acts on the debris at once, where there is any."""
+    debris = debris_object.of(ground)
+    if debris is None:
+        return
+    for name in ("Wind", "Amount", "Shaped"):
+        if (field := debris_object.field_of(debris, name)) is not None:
+            layout.prop(*field, text=name)
+
+
+CLASSES = (
+    SOFTGROUND_PT_prints,
+    SOFTGROUND_PT_material,
+    SOFTGROUND_PT_layers,
+    SOFTGROUND_PT_painted,
+    SOFTGROUND_PT_mesh,
+)

@@ -1,0 +1,78 @@
+"""Entries in Blender's own menus, through which the search (F3) finds operators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+
+class SOFTGROUND_MT_object(bpy.types.Menu):
+    """Footprints of animated characters"""
+
+    bl_label = "SoftGround"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("softground.add_character", icon="ARMATURE_DATA")
+        layout.operator("softground.add_contact", icon="PLUS")
+        layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
+        layout.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
+        layout.operator("softground.use_as_ground", icon="EYEDROPPER")
+        layout.separator()
+        layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")
+        layout.operator("softground.live", icon="PLAY")
+        layout.operator("softground.show_prints", icon="VIEWZOOM")
+        layout.operator("softground.clear_bake", icon="TRASH")
+        layout.operator("softground.apply_look", icon="MATERIAL")
+        layout.separator()
+        layout.operator("softground.overlay", icon="HIDE_OFF")
+        layout.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+        layout.operator("softground.match_depth")
+        layout.separator()
+        layout.operator("softground.force_curves", icon="GRAPH")
+        layout.operator("softground.export_forces", icon="EXPORT")
+        layout.operator("softground.event_markers", icon="MARKER_HLT")
+        layout.operator("softground.event_points", icon="POINTCLOUD_DATA")
+        layout.operator("softground.make_sound", icon="SOUND")
+        layout.separator()
+        layout.operator("softground.export", icon="EXPORT")
+        layout.operator("softground.final_mesh", icon="MESH_DATA")
+        layout.separator()
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
+        layout.separator()
+        layout.operator("softground.open_manual", icon="HELP")
+
+
+def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the add-on's menu to the Object menu."""
+    menu.layout.separator()
+    menu.layout.menu("SOFTGROUND_MT_object")
+
+
+def draw_in_armature_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the sample figure to the armatures that can be added."""
+    menu.layout.operator("softground.add_sample_scene", text="SoftGround Walking Figure", icon="OUTLINER_OB_ARMATURE")
+
+
+def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the ground to what can be added as a mesh."""
+    menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
+
+
+def register() -> None:
+    """Add the entries."""
+    bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
+    bpy.types.VIEW3D_MT_mesh_add.append(draw_in_add_menu)
+    bpy.types.VIEW3D_MT_armature_add.append(draw_in_armature_menu)
+
+
+def unregister() -> None:
+    """Take the entries away."""
+    bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
+    bpy.types.VIEW3D_MT_mesh_add.remove(draw_in_add_menu)
+    bpy.types.VIEW3D_MT_armature_add.remove(draw_in_armature_menu)
+
+
+CLASSES = (SOFTGROUND_MT_object,)

@@ -1,0 +1,392 @@
+"""The sidebar: what to set, in the order of work. Panels read and show; nothing is computed or changed in `draw`."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import bpy
+
+from ...core.ground.surfaces import SURFACES
+from ...core.motion.motion import JOINTS
+from ...core.motion.units import scale_to_metres, wrong_unit
+from .. import session, settings
+from ..characters import selection
+from ..characters.import_fixes import stature_of
+from ..ground import baked_ground, ground_mesh, still_ground
+from ..live import live
+from ..operators import bake_result, prediction
+from ..operators.character_editing import active_character, active_sole, suggested_mass
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..settings import is_prop, is_set_up
+from . import outdated, preset_menu
+
+_LARGE = 1.4
+"""Height of the buttons of the two clicks, and of the progress in the place of the second, in rows."""
+
+
+class SOFTGROUND_UL_characters(Listed):
+    """Characters by name, each with its armature."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_prop(item) else "ERROR"
+        layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
+
+
+class SOFTGROUND_UL_soles(Listed):
+    """Soles by name, each with its side."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        icon = "MESH_CUBE" if item.object else "BONE_DATA" if item.kind == "LIMB" else "MOD_DYNAMICPAINT"
+        layout.prop(item, "name", text="", emboss=False, icon=icon)
+        layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
+
+
+class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
+    """Characters that leave footprints"""
+
+    bl_label = "Character"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        options = settings.options_of(context)
+        if not options.characters:
+            nobody = selection.shows_nobody(context.selected_objects)
+            if nobody:
+                layout.label(text="Select an animated character", icon="INFO")
+            column = layout.column()
+            column.scale_y = _LARGE
+            column.operator("softground.add_character", icon="ARMATURE_DATA")
+            if nobody:
+                layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
+            return
+        row = layout.row()
+        row.template_list(
+            "SOFTGROUND_UL_characters", "", options, "characters", options, "active_character", rows=1, maxrows=5
+        )
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_character", text="", icon="ADD")
+        buttons.operator("softground.remove_character", text="", icon="REMOVE")
+        character = active_character(settings.options_of(context))
+        if character:
+            if not is_set_up(character):
+                layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
+            elif not any(sole.bone or sole.object for sole in character.soles):
+                _no_contacts(layout, character)
+            _scale(layout, settings.scene_of(context), character)
+            _on_the_spot(layout, settings.scene_of(context), character)
+            layout.prop(character, "mass")
+            if suggested_mass(character):
+                text = f"{suggested_mass(character):g} kg by Volume"
+                layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
+
+
+def _scale(layout: Any, scene: Any, character: Any) -> None:
+    """What size a character has whose file is in other units, and a button that puts it right."""
+    size = stature_of(scene, character.armature) if character.armature else 0.0
+    factor = scale_to_metres(size)
+    if factor == 1.0:
+        return
+    box = layout.box().column(align=True)
+    shown, unit = f"{size:.0f} m" if factor < 1 else f"{size * 100:.2g} cm", wrong_unit(size).partition(",")[0]
+    box.label(text=f"{shown} in size: made in {unit}", icon="ERROR", translate=False)
+    box.operator("softground.fix_scale", text=f"Scale by {factor:g}", translate=False)
+
+
+def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
+    """That a character walks in place, and a button that lets it travel."""
+    predicted = prediction.of(scene)
+    if character.armature is None or predicted is None or character.armature.name not in predicted.analysis.belts:
+        return
+    box = layout.box().column(align=True)
+    box.label(text="Walks on the spot", icon="INFO")
+    box.operator("softground.walk_ahead", icon="FORWARD")
+
+
+def _no_contacts(layout: Any, character: Any) -> None:
+    """What prints, where nothing was found: from a selection, or a bone by name or eyedropper."""
+    box = layout.box().column(align=True)
+    box.label(text="No feet found: choose what prints", icon="ERROR")
+    box.operator("softground.add_contact", text="Add from Selected Bones / Vertices", icon="PLUS")
+    if not character.soles:
+        box.operator("softground.add_sole", text="Choose a Bone", icon="EYEDROPPER")
+    elif character.armature:
+        box.prop_search(character.soles[0], "bone", character.armature.data, "bones")
+        box.prop(character.soles[0], "object")
+
+
+class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
+    """Settings that rarely need a change"""
+
+    bl_label = "Advanced"
+    bl_order = 4
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        pass
+
+
+class _OfCharacter(AdvancedPanel):
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen."""
+        character = active_character(settings.options_of(context))
+        return bool(character and is_set_up(character))
+
+
+class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
+    """Parts that touch the ground and print"""
+
+    bl_label = "Contacts"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        character = active_character(scene.softground)
+        row = layout.row()
+        row.template_list("SOFTGROUND_UL_soles", "", character, "soles", character, "active_sole", rows=3, maxrows=6)
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_sole", text="", icon="ADD")
+        buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        layout.operator("softground.add_contact", icon="PLUS")
+        sole = active_sole(scene.softground)
+        if not sole:
+            return
+        if character.armature:
+            bones = character.armature.data
+            layout.prop(sole, "side")
+            column = layout.column(align=True)
+            column.active = sole.object is None
+            column.prop(sole, "kind")
+            column.prop_search(sole, "bone", bones, "bones")
+            if sole.kind == "FOOT":
+                column.prop_search(sole, "toe_bone", bones, "bones")
+        layout.prop(sole, "object")
+
+
+class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
+    """Bones that carry the body's mass"""
+
+    bl_label = "Body Bones"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character with an armature is chosen."""
+        character = active_character(settings.options_of(context))
+        return bool(character and character.armature)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        character = active_character(settings.options_of(context))
+        layout.prop(character, "armature")
+        layout.operator("softground.detect_bones", icon="FILE_REFRESH")
+        column = layout.column(align=True)
+        order = {joint: place for place, joint in enumerate(JOINTS)}
+        for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
+            split = column.split(factor=0.3, align=True)
+            name = split.row()
+            name.alignment = "RIGHT"
+            name.label(text=_joint_label(joint.name), translate=False)
+            row = split.row(align=True)
+            row.use_property_split = False
+            row.prop_search(joint, "bone", character.armature.data, "bones", text="")
+            end = row.row(align=True)
+            end.ui_units_x = _END_WIDTH
+            end.prop(joint, "end", text="")
+
+
+_END_WIDTH = 4.8
+"""Width of a bone's end, in units of the interface: the bone has the rest."""
+
+
+def _joint_label(joint: str) -> str:
+    """`ankle_l` as people write it."""
+    name, _, side = joint.partition("_")
+    return f"{name.capitalize()} {side.upper()}".rstrip()
+
+
+class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
+    """Ground that takes the prints"""
+
+    bl_label = "Ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options = scene.softground
+        layout.prop(options, "ground", text="")
+        row = layout.row(align=True)
+        row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
+        row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")
+        row = layout.row(align=True)
+        title, picture = preset_menu.title_of_ground(options) or "Presets", preset_menu.picture_of_ground(options)
+        row.menu("SOFTGROUND_MT_presets", text=title, icon_value=picture, translate=False)
+        row.operator("softground.save_preset", text="", icon="ADD")
+        row.operator("softground.remove_preset", text="", icon="REMOVE")
+        surface = SURFACES.get(options.material.surface)  # none where what is stored is broken
+        felt = surface and surface.control
+        layout.prop(
+            *((options, felt) if felt else (options.material, "stiffness_mpa"))
+        )  # nothing moves from ground to ground
+        predicted = prediction.of(scene)
+        row = layout.row(align=True)
+        if predicted is None:
+            row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+        else:
+            field = row.row(align=True)
+            field.active = predicted.is_current
+            field.prop(options, "depth_cm")
+            row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
+            deepest = prediction.asked(scene).material.deepest
+            if predicted.depth and predicted.depth > NEARLY_AT_BOTTOM * deepest:
+                layout.label(text=f"Pressed to the bottom, {deepest * 100:.3g} cm", icon="ERROR", translate=False)
+        if options.ground is not None:
+            _changing_ground(layout, options)
+
+
+NEARLY_AT_BOTTOM = 0.95
+"""Typical depth over the deepest, beyond which the panel warns that floors come out flat."""
+_REFUSAL_WIDTH = 40
+"""Letters in a line of what live mode does not do."""
+
+
+class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
+    """Press the prints"""
+
+    bl_label = "Bake"
+    bl_order = 2
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        state = session.current()
+        live.watch()
+        options = settings.options_of(context)
+        summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
+        if summary:
+            outdated.watch(settings.scene_of(context))
+        if state.is_baking:
+            layout.enabled = True
+            row = layout.row()
+            row.scale_y = _LARGE
+            row.progress(factor=state.progress, text=state.status)
+            layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
+        else:
+            _bake_buttons(layout, options, state, is_outdated=bool(summary and state.stale))
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.enabled = not state.is_baking
+        row.prop(options, "frame_start")
+        row.prop(options, "frame_end")
+        row = layout.row(align=True)
+        row.enabled = not state.is_baking
+        row.operator("softground.show_prints", icon="VIEWZOOM")
+        row.operator("softground.clear_bake", icon="TRASH")
+        if state.is_baking:
+            return
+        for line in textwrap.wrap(live.refusal(), _REFUSAL_WIDTH):
+            row = layout.row()
+            row.alert = True
+            row.label(text=line, translate=False)
+        column = layout.column(align=True)
+        if summary:
+            bake_result.draw(column, options, summary)
+        outdated_by = "; ".join(state.stale.splitlines()) if summary else ""
+        note = outdated_by or _apart_from_scene(settings.scene_of(context))
+        row = column.row()  # which is there without a note too: nothing below it moves as one comes
+        row.active = False
+        row.label(text=note, icon="INFO" if note else "BLANK1", translate=False)
+
+
+def _bake_buttons(layout: Any, options: Any, state: Any, *, is_outdated: bool) -> None:
+    """The large button, with the feet beside it, and live mode below."""
+    row = layout.split(factor=0.66, align=True)
+    row.use_property_split = False
+    row.scale_y = _LARGE
+    row.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
+    row.prop(options, "sink_feet", toggle=True)
+    _live_buttons(layout, state)
+
+
+def _apart_from_scene(scene: Any) -> str:
+    """Why the bake leaves out frames of the scene, or goes on beyond its end; empty where they agree."""
+    options = scene.softground
+    start, end = options.frame_start, options.frame_end
+    if not options.characters or (scene.frame_start >= start and end == scene.frame_end):
+        return ""
+    whose = "Animation" if (start, end) == tuple(options.animated_frames) else "Bake"
+    return f"{whose} {start}-{end}, scene {scene.frame_start}-{scene.frame_end}"
+
+
+def _live_buttons(layout: Any, state: Any) -> None:
+    """One button to start live mode; two to end it, with and without the prints."""
+    if not state.is_live:
+        layout.operator("softground.live", icon="PLAY")
+        return
+    row = layout.row(align=True)
+    row.alert = True
+    row.operator("softground.live", text="Discard", icon="X").keep = False
+    row.alert = False
+    row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
+
+
+class SOFTGROUND_PT_overlay(AdvancedPanel, bpy.types.Panel):
+    """What to show in the viewport"""
+
+    bl_label = "Overlay"
+
+    def draw_header(self, _context: bpy.types.Context) -> None:
+        shown = session.current().show_overlay
+        icon = "HIDE_OFF" if shown else "HIDE_ON"
+        self.layout.operator("softground.overlay", text="", icon=icon, depress=shown, emboss=False)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.fields()
+        state = session.current()
+        layout.active = state.show_overlay
+        column = layout.column(align=True, heading="Show")
+        for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
+            column.prop(state, part)
+
+
+class SOFTGROUND_PT_output(AdvancedPanel, bpy.types.Panel):
+    """Use the bake elsewhere"""
+
+    bl_label = "Output"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.fields()
+        column = layout.column(align=True)
+        column.operator("softground.export", icon="EXPORT")
+        column.operator("softground.final_mesh", icon="MESH_DATA")
+        column = layout.column(align=True)
+        column.operator("softground.force_curves", icon="GRAPH")
+        column.operator("softground.export_forces", icon="EXPORT")
+        column = layout.column(align=True)
+        column.operator("softground.event_markers", icon="MARKER_HLT")
+        column.operator("softground.event_points", icon="POINTCLOUD_DATA")
+        column.operator("softground.make_sound", icon="SOUND")
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
+
+
+def _changing_ground(layout: Any, options: Any) -> None:
+    """Which frame's shape is taken of a ground that changes over time."""
+    modifier = still_ground.changes_with_time(options.ground)
+    if modifier:
+        box = layout.box().column(align=True)
+        box.label(text=f"'{modifier}' changes its shape", icon="INFO", translate=False)
+        taken = f"Taken as it is at frame {options.frame_start}"
+        box.label(text=taken, icon="BLANK1", translate=False)
+
+
+CLASSES = (
+    SOFTGROUND_UL_characters,
+    SOFTGROUND_UL_soles,
+    SOFTGROUND_PT_character,
+    SOFTGROUND_PT_ground,
+    SOFTGROUND_PT_bake,
+    SOFTGROUND_PT_advanced,
+    SOFTGROUND_PT_soles,
+    SOFTGROUND_PT_joints,
+    SOFTGROUND_PT_overlay,
+    SOFTGROUND_PT_output,
+)

@@ -1,0 +1,270 @@
+"""Ground presets in Blender's preset menu: those that come with the add-on, and the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+
+from ...core.errors import InputError
+from ...core.files import files
+from ...core.ground import presets
+from .. import jobs, settings
+from ..characters.character_setup import characters_of, title_of
+from ..operator_base import OnShot, reports_errors
+from ..operators.modal_bake import ReadingShot, Reports
+from ..reading import analysis
+from ..settings import user_folder
+from ..state import state
+from . import preset_icons
+
+
+def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
+    """The presets of a folder by name, and what is wrong with the files that are none."""
+    found, broken = [], []
+    for path in sorted(folder.glob("*.json")):
+        try:
+            found.append((path, _loaded(path)))
+        except InputError as error:
+            broken.append(str(error))
+    return sorted(found, key=lambda entry: entry[1].name.casefold()), broken
+
+
+def title_of_ground(options: Any) -> str:
+    """The name of the preset that was loaded last, and whether the ground is still as it says."""
+    name = settings.preset_of(options)
+    _, preset = next(_presets_of(name), (None, None))
+    return f"{name} (modified)" if preset and not settings.holds(options, preset) else name
+
+
+def picture_of_ground(options: Any) -> int:
+    """The number of the picture of the preset that was loaded last; 0 where it has none."""
+    return next(filter(None, (preset_icons.of(path) for path, _ in _presets_of(settings.preset_of(options)))), 0)
+
+
+def _presets_of(name: str) -> Iterator[tuple[Path, presets.Preset]]:
+    """The preset of that name with its file: that which comes with the add-on, and the user's."""
+    for path in (presets.FOLDER / _file_name(name), _file_for(name)):
+        with suppress(OSError, InputError):
+            preset = _loaded(path)
+            if preset.name == name:
+                yield path, preset
+
+
+def _loaded(path: Path) -> presets.Preset:
+    """The preset in a file, read again only where it was written since."""
+    written = path.stat().st_mtime_ns
+    if path not in state.presets or state.presets[path][0] != written:
+        state.presets[path] = written, presets.load(path)
+    return state.presets[path][1]
+
+
+class SOFTGROUND_MT_presets(bpy.types.Menu):
+    """Choose what the ground is made of"""
+
+    bl_label = "Ground Presets"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        ours, _ = listed(presets.FOLDER)
+        paths = {preset: path for path, preset in ours}
+        for section, title in presets.SECTIONS.items():
+            layout.label(text=title)
+            for preset in presets.soft_to_firm(one for one in paths if one.section == section):
+                _entry(layout, paths[preset], preset, translate=True)
+        found, broken = listed(user_folder())
+        if found or broken:
+            layout.separator()
+        for path, preset in found:
+            _entry(layout, path, preset, translate=False)
+        for message in broken:
+            layout.label(text=message, icon="ERROR", translate=False)
+
+
+def _entry(layout: Any, path: Path, preset: presets.Preset, *, translate: bool) -> None:
+    picture = preset_icons.of(path)
+    shown = {"icon_value": picture} if picture else {"icon": "BLANK1"}
+    layout.operator("softground.load_preset", text=preset.name, translate=translate, **shown).filepath = str(path)
+
+
+class SOFTGROUND_OT_load_preset(bpy.types.Operator):
+    """Set the ground to a preset"""
+
+    bl_idname = "softground.load_preset"
+    bl_label = "Load Ground Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", description="Name of a preset")
+    filepath: StringProperty(name="File", description="Preset file, instead of a name", subtype="FILE_PATH")
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
+        """Source of the preset, and the depth to expect from it for the characters of the scene."""
+        try:
+            preset = _chosen(properties)
+        except InputError as error:
+            return str(error)
+        lines = [preset.source] if preset.source else []
+        depth = analysis.expected_depth(settings.scene_of(context), preset.material)
+        if depth is not None:
+            who = ", ".join(title_of(c) for c in characters_of(settings.options_of(context)))
+            lines.append(f"Depth of the typical step of {who}: {depth * 100:.1f} cm")
+        return "\n".join(lines)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings.apply_preset(settings.options_of(context), _chosen(self))
+        return {"FINISHED"}
+
+
+def _chosen(properties: Any) -> presets.Preset:
+    path = bpy.path.abspath(properties.filepath)
+    return presets.load(Path(path)) if path else presets.find(properties.name, (presets.FOLDER, user_folder()))
+
+
+class SOFTGROUND_OT_save_preset(bpy.types.Operator):
+    """Save the ground as a preset of your own"""
+
+    bl_idname = "softground.save_preset"
+    bl_label = "Add Ground Preset"
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(name="Name", description="Name of the preset in the menu", default="My Ground", maxlen=64)
+    source: StringProperty(name="Source", description="Where the numbers come from; shown in the tooltip")
+    replace: BoolProperty(
+        name="Replace", description="Replace your preset that has this name already", options={"SKIP_SAVE"}
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "name")
+        layout.prop(self, "source")
+        if _alike(self.name, user_folder()):
+            layout.prop(self, "replace")
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        name = self.name.strip()
+        if not presets.bare(name):
+            raise InputError("A preset needs a name with letters or digits: type one.")
+        scene = settings.scene_of(context)
+        if _alike(name, presets.FOLDER):
+            raise InputError(f"'{name}' comes with SoftGround: choose another name.")
+        older, path = _alike(name, user_folder()), _file_for(name)
+        if older and not self.replace:
+            raise InputError(
+                f"You have a preset like '{name}' ({older[0].name}): choose another name, or tick Replace."
+            )
+        preset = settings.as_preset(scene.softground, name, self.source)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write_text(path, presets.dump(preset))
+        for other in older:
+            if other != path:
+                other.unlink()
+        scene.softground.material.preset = name
+        self.report({"INFO"}, f"Saved preset '{name}'")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
+    """Delete the current preset, if it is your own; the ground keeps its values"""
+
+    bl_idname = "softground.remove_preset"
+    bl_label = "Remove Ground Preset"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the chosen preset is one of the user's."""
+        cls.poll_message_set("Built-in presets cannot be deleted; choose one of your own")
+        return _own(context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = _own(context)
+        assert path is not None
+        path.unlink()
+        return {"FINISHED"}
+
+
+def _own(context: bpy.types.Context) -> Path | None:
+    """The file of the current preset, if it is the user's."""
+    current = _presets_of(settings.options_of(context).material.preset)
+    return next((path for path, _ in current if path.parent == user_folder()), None)
+
+
+def _alike(name: str, folder: Path) -> list[Path]:
+    """The presets of a folder that a name cannot be told from: by their letters and digits."""
+    wanted = presets.bare(name)
+    named = {path for path, preset in listed(folder)[0] if presets.bare(preset.name) == wanted}
+    return sorted(named | {path for path in folder.glob("*.json") if presets.bare(path.stem) == wanted})
+
+
+def _file_for(name: str) -> Path:
+    """File in which the user's preset of that name is kept; names of the same letters and digits share one."""
+    return user_folder() / f"{presets.bare(name)}.json"
+
+
+def _file_name(name: str) -> str:
+    """Name of the file in which a preset comes with the add-on: `Fresh Snow (field)` in `fresh_snow.json`."""
+    return name.partition(" (")[0].casefold().replace(" ", "_") + ".json"
+
+
+class SOFTGROUND_OT_predict_depth(ReadingShot):
+    """Read the animation and predict how deep the prints will be, before any bake. Esc cancels"""
+
+    bl_idname = "softground.predict_depth"
+    bl_label = "Predict Depth"
+    cancelled = "Predict Depth cancelled"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        return _predicting(scene)
+
+
+def _predicting(scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    analysis.forget()
+    known = yield from analysis.reading(scene)
+    depth = yield from analysis.working_out_depth(scene)
+    deepest = known.contacts.depths.max(initial=0.0)
+    return [("INFO", f"Typical step: {(depth or 0.0) * 100:.1f} cm deep; the deepest: {deepest * 100:.1f} cm")]
+
+
+class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
+    """Set the stiffness of the ground so that the typical step is as deep as you type"""
+
+    bl_idname = "softground.match_depth"
+    bl_label = "Match Depth"
+    bl_options = {"REGISTER", "UNDO"}
+
+    depth: FloatProperty(
+        name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        depth = analysis.expected_depth(settings.scene_of(context))
+        if depth:
+            self.depth = depth * 100
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    SOFTGROUND_MT_presets,
+    SOFTGROUND_OT_load_preset,
+    SOFTGROUND_OT_save_preset,
+    SOFTGROUND_OT_remove_preset,
+    SOFTGROUND_OT_predict_depth,
+    SOFTGROUND_OT_match_depth,
+)

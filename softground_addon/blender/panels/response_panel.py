@@ -1,0 +1,230 @@
+"""The sidebar's part on how characters respond to the ground, and its small operators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty
+
+from ...core.composers.responses import NOTICEABLE_GAP_MM
+from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
+from .. import session, settings
+from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
+from ..baking import root_motion
+from ..characters.import_fixes import stature_of
+from ..operators.character_editing import active_character
+from ..operators.panel_base import AdvancedPanel
+from ..response import response_job
+
+CENTRE_HEIGHT = 0.62
+"""Height of a standing body's centre of mass over that of its joints at rest, by the masses of de Leva (1996)."""
+_SHOWN = 5
+"""Frames with gaps that the panel lists."""
+
+
+class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
+    """Choose a set of values for how the body sways"""
+
+    bl_idname = "softground.tilt_preset"
+    bl_label = "Tilt Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: EnumProperty(
+        name="Values",
+        items=[
+            ("DEFAULT", "Human Balance", "0.6 Hz, damping 0.85"),
+            ("AUTHORS", "Paper's Scene", "The gains of the scene that comes with the paper: 1300 and 600"),
+            ("PAPER", "Paper as Printed", "The gains in the paper's text, 30 and 6: swings of many seconds"),
+        ],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the chosen character has bones and a mass, which the paper's values depend on."""
+        cls.poll_message_set("Choose a character with an armature and a mass first")
+        scene = settings.scene_of(context)
+        character = active_character(scene.softground)
+        return bool(
+            character and character.armature and character.mass > 0 and stature_of(scene, character.armature) > 0
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        character = active_character(scene.softground)
+        body = {"mass": character.mass, "arm": CENTRE_HEIGHT * stature_of(scene, character.armature)}
+        gains = {
+            "DEFAULT": TiltGains(),
+            "AUTHORS": body_gains(*AUTHORS_TORQUES, **body),
+            "PAPER": body_gains(*PAPER_TORQUES, **body),
+        }[self.source]
+        scene.softground.tilt.frequency, scene.softground.tilt.damping = gains.frequency, gains.damping
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_show_frame(bpy.types.Operator):
+    """Go to this frame"""
+
+    bl_idname = "softground.show_frame"
+    bl_label = "Show Frame"
+    bl_options = {"INTERNAL"}
+
+    frame: FloatProperty(name="Frame", options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings.scene_of(context).frame_set(int(self.frame), subframe=self.frame % 1.0)
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_slow_down(bpy.types.Operator):
+    """Stretch the scene's time (Output > Frame Range > Time Stretching) to the speed at which people would walk on
+    this ground. Bake again afterwards"""
+
+    bl_idname = "softground.slow_down"
+    bl_label = "Slow Down"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a bake has told the speed."""
+        cls.poll_message_set("Bake with Sink Feet or Grounding on first: the bake suggests a speed")
+        character = active_character(settings.options_of(context))
+        return bool(character and character.armature and has_layer(character.armature))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        character = active_character(scene.softground)
+        assert character is not None
+        settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
+        return {"FINISHED"}
+
+
+class _RemoveLayer(bpy.types.Operator):
+    """Base of the operators that remove layers of some kinds from all characters."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    kinds = tuple(LayerKind)  # without an annotation: Blender would keep what it names, and hang as Python exits
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if a character has such a layer and no job runs."""
+        characters = settings.options_of(context).characters
+        if not any(one.armature and has_layer(one.armature, cls.kinds[0]) for one in characters):
+            cls.poll_message_set("No character has this layer")
+            return False
+        return not session.current().is_baking
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        response_job.remove_layers(settings.scene_of(context), *self.kinds)
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_remove_root_motion(_RemoveLayer):
+    """Remove the travel, and the layers that were made with it: the animation is as it was before"""
+
+    bl_idname = "softground.remove_root_motion"
+    bl_label = "Remove Root Motion"
+
+
+class SOFTGROUND_OT_remove_clean_feet(_RemoveLayer):
+    """Remove the cleaning: feet slide again as they are animated"""
+
+    bl_idname = "softground.remove_clean_feet"
+    bl_label = "Remove Clean Feet"
+    kinds = (LayerKind.CLEAN_FEET,)
+
+
+class SOFTGROUND_OT_remove_response(_RemoveLayer):
+    """Remove the response to the ground; the footprints stay"""
+
+    bl_idname = "softground.remove_response"
+    bl_label = "Remove Response"
+    kinds = (LayerKind.RESPONSE,)
+
+
+_REMOVE: dict[LayerKind, Any] = {
+    LayerKind.ROOT_MOTION: SOFTGROUND_OT_remove_root_motion,
+    LayerKind.CLEAN_FEET: SOFTGROUND_OT_remove_clean_feet,
+    LayerKind.RESPONSE: SOFTGROUND_OT_remove_response,
+}
+
+
+class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
+    """How the character responds to the ground that gives way"""
+
+    bl_label = "Response"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen."""
+        character = active_character(settings.options_of(context))
+        return bool(character and character.armature)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options, character = scene.softground, active_character(scene.softground)
+        row = layout.row(align=True)
+        row.operator("softground.clean_feet", icon="CON_FLOOR")
+        row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
+        if character and root_motion.speed_of(character.armature):
+            speed = f"Travels at {root_motion.speed_of(character.armature):.2f} m/s"
+            layout.label(text=speed, translate=False)
+        layout.prop(options, "output")
+        column = _group(layout, options.grounding, ("align", "lock"))
+        column.separator()
+        for part in settings.PERFORMANCE:
+            column.prop(options.grounding, part)
+        column = _group(layout, options.tilt, ("strength", "lateral", "frequency", "damping"))
+        column.operator_menu_enum("softground.tilt_preset", "source")
+        if character:
+            _layers(layout, character)
+
+
+def _layers(layout: Any, character: Any) -> None:
+    """The layers on a character, each with its strength and a button that removes it; what the response notes."""
+    kinds = [kind for kind in LayerKind if has_layer(character.armature, kind)]
+    for kind in kinds:
+        row = layout.row(align=True)
+        row.prop(character, kind.strength, slider=True)
+        row.operator(_REMOVE[kind].bl_idname, text="", icon="X")
+    if kinds:
+        layout.operator("softground.make_keys", icon="KEYINGSET")
+    if LayerKind.RESPONSE in kinds:
+        _layer_notes(layout, notes_of(character.armature))
+
+
+def _group(layout: Any, group: Any, fields: tuple[str, ...]) -> Any:
+    """A switch, and the fields that count while it is on."""
+    layout.prop(group, "use")
+    column = layout.column(align=True)
+    column.active = group.use
+    for field in fields:
+        column.prop(group, field)
+    return column
+
+
+def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
+    """Which bone carries the body, and the frames where a gap is left."""
+    box = layout.box().column(align=True)
+    row = box.row()
+    row.label(text="Keyed On", icon="BONE_DATA")
+    row.label(text=notes.get(response_job.ROOT_CONTROL, ""), translate=False)
+    speed = f"{response_job.speed_in(notes):.0%}"
+    row = box.split(factor=0.72)
+    row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)
+    row.operator("softground.slow_down", text="Apply")
+    for frame, gap_mm, sole in response_job.worst_gaps_in(notes)[:_SHOWN]:
+        if abs(gap_mm) >= NOTICEABLE_GAP_MM:
+            shown = f"Frame {frame:g}: {gap_mm:.1f} mm under {sole}"
+            box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = frame
+
+
+CLASSES = (
+    SOFTGROUND_OT_tilt_preset,
+    SOFTGROUND_OT_show_frame,
+    SOFTGROUND_OT_slow_down,
+    *_REMOVE.values(),
+    SOFTGROUND_PT_response,
+)

@@ -1,0 +1,69 @@
+"""Which attributes and properties of a mesh a bake has made: a user may have data of the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
+
+import bpy
+
+from .playback_nodes import AGE, COMPRESSION, OF_PLAYBACK, REST, RIM
+from .weather_nodes import OF_WEATHER, WATER
+
+SOLE = "softground_sole"
+"""Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, *OF_PLAYBACK, *OF_WEATHER)
+
+RECORD = "softground_record"
+SUMMARY = "softground_summary"
+WARNINGS = "softground_warnings"
+FINGERPRINTS = "softground_fingerprints"
+"""What a bake was made from, as JSON."""
+MADE = "softground_made"
+"""Property of a mesh that carries a bake: the names of the attributes that the bake has made, in lines."""
+PROPERTIES = (RECORD, SUMMARY, WARNINGS, FINGERPRINTS, MADE)
+"""Properties of a mesh that carries a bake."""
+
+
+def made(mesh: bpy.types.Mesh) -> set[str]:
+    """Names of the attributes that a bake has made on a mesh, as far as they are still there."""
+    return {name for name in _noted(mesh) if name in ATTRIBUTES and name in mesh.attributes}
+
+
+def has_made(mesh: bpy.types.Mesh, name: str) -> bool:
+    """Whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
+    return name in _noted(mesh) and name in mesh.attributes
+
+
+def _noted(mesh: bpy.types.Mesh) -> Sequence[str]:
+    return str(mesh.get(MADE, "")).split("\n")
+
+
+def users_own(ground: bpy.types.Object) -> list[str]:
+    """What of a ground a bake would need for itself, and the user has made."""
+    mesh = cast("bpy.types.Mesh", ground.data)
+    ours = made(mesh)
+    there = {*mesh.attributes.keys(), *ground.vertex_groups.keys()}  # which may not be called alike
+    attributes = [name for name in ATTRIBUTES if name in there and name not in ours]
+    return attributes if ours else [*attributes, *(name for name in PROPERTIES if name in mesh.keys())]  # noqa: SIM118
+
+
+def attribute(mesh: bpy.types.Mesh, name: str, kind: str) -> Any:
+    """A point attribute, new unless there is one of that kind; the one that the user has active stays so."""
+    ours = made(mesh)
+    there = mesh.attributes.get(name)
+    if there and (there.domain, there.data_type) == ("POINT", kind):
+        return there
+    if there:
+        mesh.attributes.remove(there)
+    active = mesh.attributes.active_index
+    mesh.attributes.new(name, cast("Any", kind), "POINT")
+    mesh.attributes.active_index = active
+    mesh[MADE] = "\n".join(sorted(ours | {name}))
+    return mesh.attributes[name]
+
+
+def remove(mesh: bpy.types.Mesh, names: Iterable[str]) -> None:
+    """Take away attributes of these names that a bake has made."""
+    for name in made(mesh).intersection(names):
+        mesh.attributes.remove(mesh.attributes[name])

@@ -1,0 +1,75 @@
+"""The modifier that plays weather over a bake, and the attributes that are its own."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import bpy
+
+from .. import node_modifiers
+from . import own_data, playback, weather_table
+from . import weather_nodes as nodes
+
+MODIFIER = nodes.GROUP
+
+
+def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The ground's weather, whatever the names of the modifier and its node group have become."""
+    modifier: bpy.types.Modifier | None = node_modifiers.modifier_with(ground, nodes.is_weather)
+    return modifier
+
+
+def inputs_of(modifier: Any) -> dict[str, str]:
+    """Identifier of each of the inputs that set the weather, by its name."""
+    known = {name for name, *_ in nodes.INPUTS}
+    return {name: identifier for name, identifier in node_modifiers.inputs_of(modifier).items() if name in known}
+
+
+def put(ground: bpy.types.Object, tree: bpy.types.NodeTree) -> Any:
+    """Have weather act on an object, right behind its playback; the modifier that is active stays so."""
+    active = ground.modifiers.active
+    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = tree
+    modifier.show_in_editmode = False
+    before = playback.modifier_of(ground)
+    place = list(ground.modifiers).index(before) + 1 if before else 0
+    ground.modifiers.move(len(ground.modifiers) - 1, place)
+    if active:
+        ground.modifiers.active = active
+    return modifier
+
+
+def separate(modifier: Any) -> bool:
+    """Give weather a group of its own, with its tables, if a copy of its object has the same; False if none has."""
+    tree = modifier.node_group
+    if tree.users - tree.use_fake_user < 2:
+        return False
+    tree = modifier.node_group = tree.copy()
+    inner = nodes.within(tree)
+    holder = next(node for node in tree.nodes if getattr(node, "node_tree", None) == inner)
+    inner = holder.node_tree = inner.copy()
+    for name in weather_table.TABLES:
+        weather_table.separate(inner, name)
+    return True
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take weather off a ground and copies of it with the same mesh; nothing happens where there is none."""
+    mesh = cast("bpy.types.Mesh", ground.data)
+    copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
+    for shown in {ground, *copies}:
+        while modifier := modifier_of(shown):
+            shown.modifiers.remove(modifier)
+    remove_unused()
+    own_data.remove(mesh, nodes.OF_WEATHER)
+
+
+def remove_unused() -> None:
+    """Remove the groups that no modifier has any more."""
+    for group in [one for one in bpy.data.node_groups if nodes.is_weather(one) and not (one.users or one.library)]:
+        inner = nodes.within(group)
+        bpy.data.node_groups.remove(group)
+        if inner and not inner.users:
+            tables = [weather_table.named(inner, name) for name in weather_table.TABLES]
+            bpy.data.node_groups.remove(inner)
+            weather_table.remove_unused(tables)

@@ -1,0 +1,427 @@
+"""The node group of weather over a bake, behind the playback's.
+
+z = rest + kept·relief(sigma) + level. The level is that of untouched ground, which the weather has acted on from the
+start, and in a print that since it was made; relief and bounds of prints lose their edges as variances add up.
+
+Native Blender data that needs nothing of this add-on. All that follows from a vertex's last contact alone is worked out
+for each moment of `weather_course_nodes`, of which the vertex has the number. What is left for each vertex is linear in
+what `core.weather.weather_places` found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import bpy
+
+from ...core.weather import weather as w
+from ...core.weather.weather import Matter, Span
+from ...core.weather.weather_places import BOUNDS, COVERED, NEAR, POWERS
+from .. import node_graph
+from ..node_graph import NodeGraph, Number
+from ..node_modifiers import new_group
+from . import weather_table
+from .playback_nodes import COMPRESSION, MOVED, REST, RIM
+from .weather_course_nodes import ENDLESS, HOLLOWS, TABLE, CourseNodes
+
+GROUP = "SoftGround Weather"
+MARK = "softground_weather"
+"""Custom property of the group, whatever the user calls it."""
+WITHIN = "SoftGround Weather Nodes"
+"""The group that has the nodes. Of a modifier's own group, Blender notes the values of all sockets at each frame."""
+
+BLUR, TRODDEN = "softground_weather_blur", "softground_weather_trodden"
+PRESSED, MOMENT, COMPACTED = (
+    "softground_weather_pressed",
+    "softground_weather_moment",
+    "softground_weather_compacted",
+)
+"""Frame of the first contact; number of the last one's end among the moments, 0 where there is none; what steps
+compressed, on snow alone [m]."""
+AGAIN, BEFORE, BLUR_BEFORE = (
+    "softground_weather_again",
+    "softground_weather_before",
+    "softground_weather_blur_before",
+)
+"""First frame of the last step into an earlier print, and moment and blur that hold until then; only where there are
+such steps."""
+HOLLOW, ABOVE = "softground_weather_hollow", "softground_weather_above"
+"""Number of the hollow among those of `weather_course_nodes.HOLLOWS`, 0 where there is none; how far the undisturbed
+ground is above its bottom [m]."""
+OF_WEATHER = {
+    BLUR: "FLOAT_VECTOR",
+    TRODDEN: "FLOAT_VECTOR",
+    PRESSED: "FLOAT",
+    MOMENT: "INT",
+    COMPACTED: "FLOAT",
+    AGAIN: "FLOAT",
+    BEFORE: "INT",
+    BLUR_BEFORE: "FLOAT_VECTOR",
+    HOLLOW: "INT",
+    ABOVE: "FLOAT",
+}
+"""Types of these attributes of a mesh, by their names."""
+
+WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
+BLOWN = "softground_blown"
+"""What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
+standing water [m]; how dry it looks where it was wet to begin with, and how much of a print blown sand or snow covers,
+0 to 1."""
+
+INPUTS = (
+    ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
+    (
+        "Temperature",
+        0.0,
+        -60.0,
+        40.0,
+        "Air temperature in °C. Above 0, new snow melts first, then the ground's, trodden snow last",
+    ),
+    (
+        "Wind",
+        0.0,
+        0.0,
+        60.0,
+        "Wind speed in metres per second, at 10 m. It blows sand into prints from about 5 on, snow from 6",
+    ),
+    ("Rain", 0.0, 0.0, 500.0, "Rain in millimetres per hour. It rounds edges; what does not soak in stands in prints"),
+    (
+        "Drying",
+        0.0,
+        0.0,
+        50.0,
+        "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
+    ),
+    (
+        "Water Table",
+        100.0,
+        0.0,
+        100.0,
+        "Water level in centimetres below the brim of each print, to which water seeps in",
+    ),
+    ("Halo", 0.0, 0.0, 1.0, "How pale wet sand turns around a loaded foot; it is wet again seconds later"),
+    (
+        "Time Scale",
+        1.0,
+        0.0,
+        1e7,
+        "How many times faster than the animation the weather runs: 2880 shows 8 hours in 10 seconds",
+    ),
+)
+"""Name, value, least, most and description of each of the group's inputs."""
+
+
+def new() -> Any:
+    """A new group with its inputs and nothing in it."""
+    tree = new_group(GROUP, MARK)
+    _add_sockets(tree)
+    return tree
+
+
+def _add_sockets(tree: Any) -> None:
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    for name, value, least, most, description in INPUTS:
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
+        socket.default_value, socket.min_value, socket.max_value = value, least, most
+        socket.description = description
+
+
+def is_weather(tree: bpy.types.NodeTree) -> bool:
+    """Whether a node group is one that `new` made."""
+    return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def within(tree: Any) -> Any:
+    """The group in a group of weather that has its nodes; None where nothing is in it yet."""
+    return next((node.node_tree for node in tree.nodes if node.bl_idname == "GeometryNodeGroup"), None)
+
+
+def build(
+    tree: Any,
+    *,
+    matter: Matter,
+    up: Sequence[float],
+    span: Span,
+    soaking: tuple[float, float] = (1.0, 1.0),
+    felt: bool = False,
+    again: bool = False,
+    has_water: bool = True,
+) -> None:
+    """Fill a group, in place of what is in it; its inputs stay. See `node_graph.build`.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+        From `new`.
+    matter : Matter
+        What the ground is.
+    up : (3,) floats
+        World up in the ground's own space and units, of the length of one metre.
+    span : Span
+        In frames of the scene.
+    soaking : (float, float)
+        Of the hollows; see `core.weather.weather_places.soaking_shares`.
+    felt : bool
+        Whether steps felt the weather: how deep they are below new snow is then not what the record has.
+    again : bool
+        Whether there are steps into earlier prints.
+    has_water : bool
+        Whether the bake itself has water in prints.
+    """
+    inner = within(tree)
+    if inner is None:
+        inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
+        _add_sockets(inner)
+    there = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
+    asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
+    tables = {name: there[name] or weather_table.new() for name in asked}
+    weather_table.describe(inner, matter, span, soaking)
+    fill = partial(
+        _fill,
+        matter=matter,
+        up=up,
+        span=span,
+        soaking=soaking,
+        felt=felt,
+        again=again,
+        has_water=has_water,
+        tables=tables,
+    )
+    node_graph.build(inner, fill)
+    weather_table.remove_unused(there.values())
+    node_graph.build(tree, partial(_hold, inner=inner))
+
+
+def _hold(graph: NodeGraph, inner: Any) -> None:
+    """Have a group do what the one within does."""
+    group = graph.node("NodeGroupInput")
+    held = graph.node("GeometryNodeGroup", node_tree=inner)
+    for name in ("Geometry", *(name for name, *_ in INPUTS)):
+        graph.link(group.outputs[name], held.inputs[name])
+    graph.finish(held.outputs["Geometry"])
+
+
+def _fill(
+    graph: NodeGraph,
+    *,
+    matter: Matter,
+    up: Sequence[float],
+    span: Span,
+    soaking: tuple[float, float],
+    felt: bool,
+    again: bool,
+    has_water: bool,
+    tables: Mapping[str, Any],
+) -> None:
+    """Make the nodes of a group; see `build`."""
+    group = graph.node("NodeGroupInput")
+    said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
+    course = CourseNodes(graph, said, matter, span, soaking, tables[TABLE])
+    ground = _Vertices(graph, course, matter, up, again=again, has_water=has_water, hollows=tables.get(HOLLOWS))
+
+    graph.next_row()
+    geometry = group.outputs["Geometry"]
+    changed = ground.pressed(geometry) if felt and matter.snow_depth else geometry
+    changed = ground.moved(changed, said["Water Table"] * 0.01)
+    if matter.wet:
+        changed = ground.dried(changed, said["Halo"])
+    graph.finish(graph.choose("GEOMETRY", course.is_any.socket, geometry, changed))
+
+
+class _Vertices:
+    """What the weather makes of the vertices.
+
+    Parameters
+    ----------
+    graph : NodeGraph
+    course : CourseNodes
+    matter : Matter
+    up : (3,) floats
+        See `build`.
+    again, has_water : bool
+        See `build`.
+    hollows : bpy.types.Object or None
+        Where water stands; see `weather_course_nodes.HOLLOWS`.
+    """
+
+    def __init__(
+        self,
+        graph: NodeGraph,
+        course: CourseNodes,
+        matter: Matter,
+        up: Sequence[float],
+        *,
+        again: bool,
+        has_water: bool,
+        hollows: Any,
+    ) -> None:
+        self._graph, self._course, self._matter, self._up = graph, course, matter, tuple(up)
+        self._has_water, self._hollows = has_water, hollows
+        self._acts = course.acts
+        not_yet = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(PRESSED))
+        self._moment, self._blur = graph.attribute(MOMENT, "INT"), graph.attribute(BLUR, "FLOAT_VECTOR")
+        if again:
+            before = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(AGAIN))
+            self._moment = graph.choose("INT", before, self._moment, graph.attribute(BEFORE, "INT"))
+            self._blur = graph.choose("VECTOR", before, self._blur, graph.attribute(BLUR_BEFORE, "FLOAT_VECTOR"))
+        self._moment_if_begun = graph.choose("INT", not_yet, self._moment, 0)
+        self._share = _shares(graph, course.aged["variance"])
+        _, wider, widest = graph.parts(self._share)
+        self._inside = graph.combined(
+            *(one.socket for one in (course.begun, wider * course.begun, widest * course.begun))
+        )
+        self._kept = course.aged["filled"] + 1.0
+        self._trodden = graph.attribute(TRODDEN, "FLOAT_VECTOR")
+
+    def pressed(self, geometry: Any) -> Any:
+        """The geometry as deep as steps that felt weather have pressed new snow."""
+        graph = self._graph
+        begun = graph.number(self._moment_if_begun).at_most(1.0)
+        deep = graph.number(graph.attribute(COMPACTED)) * begun
+        deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
+        return self._with(geometry, {COMPRESSION: deep}, self._acts["Snowfall"])
+
+    def moved(self, geometry: Any, table: Number) -> Any:
+        """The geometry as high as the weather has it, under new snow and water, looking no more trodden than it is.
+
+        `table` is how far below the brims of hollows water comes by itself [m].
+        """
+        graph, acts, matter = self._graph, self._acts, self._matter
+        rounded, relief = self._rounded(), self._relief()
+        cover = self._around("cover", self._not_full(self._inside))
+        change = rounded.where(acts["Snowfall"], acts["Temperature"], acts["Rain"])
+        worn: dict[str, Number] = {}
+        if matter.drifts_from:
+            filled = self._number(self._course.aged["filled"], self._moment)
+            change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
+            pressed, risen = (graph.number(graph.attribute(name)) for name in (COMPRESSION, RIM))
+            left = filled + 1.0
+            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * left, risen * left, rounded), strict=True))
+            worn[BLOWN] = (pressed * filled * (-1.0 / COVERED)).within_one()
+        height = change + cover.where(acts["Snowfall"])
+        if matter.snow_depth:
+            # Vertices that the user adds have no place at rest.
+            left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
+            height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
+        fresh = (cover * (1.0 / COVERED)).within_one()
+        floods = acts["Rain"] + acts["Water Table"]
+        standing = [self._standing(table, relief + height).where(floods)] if matter.soaking else []
+        # Once and together, as each node works out all that it asks for anew.
+        geometry, (height, fresh, *others) = graph.captured(geometry, height, fresh, *standing, *worn.values())
+        standing, looks = others[: len(standing)], others[len(standing) :]
+        if worn:
+            blown = graph.forgotten(geometry, COMPRESSION, RIM)  # what takes the place of another is copied
+            for name, look in zip(worn, looks, strict=True):
+                blown = graph.store(blown, name, look.socket, True)
+            geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, blown)
+        geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
+        wetness = self._course.around["wet"]
+        if matter.wet:
+            wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
+        dry = graph.store(geometry, WETNESS, wetness.socket, True)
+        if not standing:
+            return graph.put_higher(dry, self._up, height.socket)
+        depth = deepest = standing[0]
+        if self._has_water:  # which stays
+            deepest = graph.number(graph.attribute(WATER)).at_least(depth)
+        wet = graph.store(geometry, WATER, deepest.socket, True)
+        wet = graph.store(wet, WETNESS, wetness.at_least(depth.above(0.0)).socket, True)
+        geometry = graph.choose("GEOMETRY", floods.socket, dry, wet)
+        return graph.put_higher(geometry, self._up, (height + depth.where(floods)).socket)
+
+    def dried(self, geometry: Any, halo: Number) -> Any:
+        """The geometry with how dry ground looks that is wet to begin with."""
+        graph, acts = self._graph, self._acts
+        dried = 1.0 - graph.number(graph.attribute(WETNESS))
+        if self._matter.pales:
+            near = graph.number(graph.dot(self._trodden, (NEAR,) * 3)).within_one()
+            pale = self._number(self._course.aged["pale"] * self._course.begun, self._moment_if_begun)
+            dried = dried.at_least((halo * near * pale).where(acts["Halo"]))
+        return self._with(geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
+
+    def _rounded(self) -> Number:
+        """What edges that are lost change the height by [m]."""
+        return self._dot(self._blur, self._not_full(self._share), self._moment)
+
+    def _standing(self, table: Number, relief: Number) -> Number:
+        """Depth of water in hollows of a relief [m]."""
+        graph = self._graph
+        hollows = graph.object_geometry(self._hollows, HOLLOWS)
+        level = graph.at_index(hollows, self._levels(table).socket, graph.attribute(HOLLOW, "INT"), "FLOAT")
+        return (graph.number(level) - graph.number(graph.attribute(ABOVE)) - relief).at_least(0.0)
+
+    def _levels(self, table: Number) -> Number:
+        """Height of the water in each of the hollows over its bottom [m], far below it in a dry one."""
+        graph, course = self._graph, self._course
+        capacity, left, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
+        rise = graph.attribute("rise", "FLOAT_VECTOR")
+        low, high, seeped = course.hollows(filled.socket)
+        excess = low + (high - low) * course.between(left)
+        share = (excess / capacity).within_one()
+        root = share.root()
+        powers = graph.combined(*(one.socket for one in (root, share, share * root)))
+        brim = graph.number(graph.dot(rise, (1.0,) * POWERS))
+        risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
+        level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
+        return level - (1.0 - level.above(0.0)) * ENDLESS
+
+    def _thawed(self, left: Number) -> Number:
+        """What has melted of snow of which so much would be left without [m]."""
+        graph, depth = self._graph, self._matter.snow_depth
+        ratio = (1.0 - graph.number(graph.attribute(COMPACTED)) * (1.0 / depth)).at_least(0.0)
+        around = self._course.around["thawed"].at_most(left)
+        within = (self._number(self._course.aged["thawed"], self._moment) * ratio * ratio).at_most(left)
+        return around + (within - around) * self._dot(
+            self._trodden, self._not_full(self._inside), self._moment_if_begun
+        )
+
+    def _not_full(self, vector: Any) -> Any:
+        """A vector of the moments by the share of prints that is not blown full."""
+        return self._graph.scaled(vector, self._kept.socket) if self._matter.drifts_from else vector
+
+    def _around(self, name: str, inside: Any) -> Number:
+        """What it is of open ground, and in prints since they were made."""
+        around = self._course.around[name]
+        more = self._graph.scaled(inside, (self._course.aged[name] - around).socket)
+        return around + self._dot(self._trodden, more, self._moment_if_begun)
+
+    def _dot(self, stored: Any, of_moments: Any, moment: Any) -> Number:
+        """A vector of the vertices by one that belongs to their moments."""
+        looked_up = self._graph.at_index(self._course.rows, of_moments, moment)
+        return self._graph.number(self._graph.dot(stored, looked_up))
+
+    def _number(self, value: Number, moment: Any) -> Number:
+        """A number of the vertices' moments."""
+        moments = self._course.rows
+        return self._graph.number(self._graph.at_index(moments, value.socket, moment, "FLOAT"))
+
+    def _relief(self) -> Number:
+        """How high a vertex is over its place at rest [m]."""
+        graph, up = self._graph, self._up
+        position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+        moved = graph.vector("SUBTRACT", position, graph.attribute(REST, "FLOAT_VECTOR"))
+        metre = sum(part * part for part in up)
+        return graph.number(graph.dot(moved, tuple(part / metre for part in up)))
+
+    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number, selection: Any = True) -> Any:
+        """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
+        graph, changed = self._graph, geometry
+        for name, value in values.items():
+            changed = graph.store(changed, name, value.socket, selection)
+        return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).socket, geometry, changed)
+
+
+def _shares(graph: NodeGraph, variance: Number) -> Any:
+    """How far a variance is through each of the spans between `BOUNDS`, 0 to 1."""
+    spans = [high - low for low, high in pairwise(BOUNDS)]
+    factors = tuple(1.0 / span for span in spans)
+    offsets = tuple(-low / span for low, span in zip(BOUNDS[:-1], spans, strict=True))
+    return _within_one(graph, graph.vector("MULTIPLY_ADD", variance.socket, factors, offsets))
+
+
+def _within_one(graph: NodeGraph, vector: Any) -> Any:
+    return graph.vector("MINIMUM", graph.vector("MAXIMUM", vector, (0.0,) * 3), (1.0,) * 3)

@@ -1,0 +1,279 @@
+"""Roles of bones: joints and feet of an armature, from the names of the usual rigs, else from its rest pose.
+
+`bone_names` reads each name by itself; here bones with the same word are distinguished, and joints that the names leave
+out are completed from the rest pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.errors import InputError
+from ...core.rig.bones import RestBone, RigBones
+from ...core.rig.mapping import BoneEnd, RigMapping
+from ...core.settings import SoleSource
+from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
+from .libraries import check_libraries
+from .rest_pose import map_by_rest_pose
+
+CHOOSE_CONTACTS = (
+    "select the bones that touch the ground in Pose Mode, or vertices of the mesh in Edit Mode, and press Add Contact "
+    "in Advanced > Contacts"
+)
+"""Remedy if no feet are found."""
+
+
+def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
+    """Joints and feet of an armature.
+
+    Parameters
+    ----------
+    armature : bpy.types.Object
+        Only read; may be linked or overridden.
+    posed : bool
+        True if the current pose stands in for the rest pose.
+
+    Returns
+    -------
+    RigMapping
+
+    Raises
+    ------
+    InputError
+        If the object is no armature, or no feet are found by name or by rest pose.
+    """
+    require_armature(armature)
+    bones = armature.data.bones
+    mapping = _map_by_names(bones)
+    if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
+        shape = map_by_rest_pose(armature, posed=posed)
+        if shape is not None:
+            joints, feet = shape
+            by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
+            mapping = by_shape if mapping is None else _completed(mapping, by_shape)
+    if mapping is None:
+        raise InputError(
+            f"No feet found in '{armature.name}', neither by the names of its bones nor by how they lie: "
+            f"{CHOOSE_CONTACTS}."
+        )
+    return mapping
+
+
+_LEG, _ARM = ("hip", "knee", "ankle", "ball", "toe"), ("shoulder", "elbow", "wrist")
+
+_WHOLE_BODY = frozenset(("hips", "neck", "head", *(f"{joint}_{side}" for joint in (*_LEG[:3], *_ARM) for side in "lr")))
+"""Joints without which the rest pose is read, too."""
+
+
+def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
+    """The mapping by names, completed from the shape of the rest pose.
+
+    A leg that is named in part is taken whole from the shape, as its words may mean other bones; of arms and trunk, the
+    missing joints. Limbs on which the two disagree stay as they are named, and what is named a leg is no arm.
+    """
+    joints, soles, by_shape = dict(named.joints), named.soles, dict(shaped.joints)
+    arms, named_legs = ({f"{joint}_{side}" for joint in limb for side in "lr"} for limb in (_ARM, _LEG))
+    legs = {joints[joint][0] for joint in named_legs & joints.keys()}
+    if any(by_shape[joint][0] in legs for joint in arms & by_shape.keys()):
+        by_shape = {joint: place for joint, place in by_shape.items() if joint not in arms}
+    shaped_soles = {sole.name: sole for sole in shaped.soles}
+    for side in "lr":
+        leg, arm = ([f"{joint}_{side}" for joint in limb] for limb in (_LEG, _ARM))
+        if _is_part_of_leg(joints, by_shape, side):
+            joints = {joint: place for joint, place in joints.items() if joint not in leg}
+            joints |= {joint: by_shape[joint] for joint in leg if joint in by_shape}
+            soles = tuple(shaped_soles.get(sole.name, sole) if sole.side.lower() == side else sole for sole in soles)
+        shoulder = f"shoulder_{side}"
+        if shoulder not in joints or joints[shoulder] == by_shape.get(shoulder):
+            joints = _with_missing(joints, by_shape, arm)
+    trunk = [joint for joint in by_shape if not joint.endswith(("_l", "_r"))]
+    return RigMapping(_with_missing(joints, by_shape, trunk), soles, named.method)
+
+
+def _is_part_of_leg(joints: Mapping[str, BoneEnd], by_shape: Mapping[str, BoneEnd], side: str) -> bool:
+    """True if a leg is named in part, and ends at a bone that is the end of a leg by its shape too."""
+    hip, knee, ankle, ball, _ = (f"{joint}_{side}" for joint in _LEG)
+    is_whole = {hip, knee, ankle} <= joints.keys()
+    return not is_whole and ankle in joints and joints[ankle] in (by_shape.get(ankle), by_shape.get(ball))
+
+
+def _with_missing(
+    joints: Mapping[str, BoneEnd], by_shape: Mapping[str, BoneEnd], wanted: Iterable[str]
+) -> dict[str, BoneEnd]:
+    """The joints, with the wanted ones that only the shape has."""
+    return {**joints, **{joint: by_shape[joint] for joint in wanted if joint in by_shape and joint not in joints}}
+
+
+def instances_armature(obj: bpy.types.Object) -> bool:
+    """True if an object shows an armature of the collection that it instances, as linked characters are at first."""
+    collection = obj.instance_collection
+    return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)
+
+
+def instances_mesh(obj: bpy.types.Object) -> bool:
+    """True if an object shows a mesh of the collection that it instances, and no armature."""
+    collection = obj.instance_collection
+    if collection is None or instances_armature(obj):
+        return False
+    return any(part.type == "MESH" for part in collection.all_objects)
+
+
+def parts_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The mesh objects of which an empty is the top, where no armature is among them."""
+    below = obj.children_recursive if obj.type == "EMPTY" else []
+    return [] if any(part.type == "ARMATURE" for part in below) else [part for part in below if part.type == "MESH"]
+
+
+def require_armature(armature: bpy.types.Object | None) -> None:
+    """Raise InputError unless the object is an armature with bones."""
+    if armature is None:
+        raise InputError(
+            "No armature is chosen: select the character's armature, or mesh objects that fall or roll, and press Add "
+            "Character."
+        )
+    check_libraries(armature)
+    if instances_armature(armature):
+        raise InputError(
+            f"The armature of '{armature.name}' is in a collection instance and cannot be read there: make it real "
+            "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
+        )
+    if parts := parts_of(armature):
+        raise InputError(
+            f"'{armature.name}' has no armature, only mesh objects below it: select those that touch the ground (of "
+            f"{', '.join(repr(part.name) for part in parts)}) and press Add Character; each prints as a rigid body."
+        )
+    if armature.type != "ARMATURE":
+        raise InputError(
+            f"'{armature.name}' is not an armature but of type {armature.type.title()}: select the character's "
+            "armature."
+        )
+    if not armature.data.bones:
+        raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")
+
+
+def rest_bones(armature: bpy.types.Object) -> RigBones:
+    """The bones of an armature at rest."""
+    return {
+        bone.name: RestBone(
+            parent=bone.parent.name if bone.parent else "",
+            matrix=np.array(bone.matrix_local, dtype=float),
+            head=np.array(bone.head_local, dtype=float),
+            tail=np.array(bone.tail_local, dtype=float),
+            length=bone.length,
+        )
+        for bone in armature.data.bones
+    }
+
+
+def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
+    """The mapping that the names give, or None where they name no foot."""
+    names = read_names(bones)
+    by_name = {bone.name: bone for bone in bones}
+    joints: dict[str, BoneEnd] = {}
+    soles = []
+    for side, suffix in (("L", "_l"), ("R", "_r")):
+        limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
+        _settle_ambiguities(limb, names, by_name, side)
+        foot, toe = limb["foot"], limb["toe"]
+        for joint, segment in _JOINT_HEADS.items():
+            if bone := limb[segment]:
+                joints[joint + suffix] = (bone, "head")
+        if "wrist" + suffix not in joints and limb["forearm"]:
+            joints["wrist" + suffix] = (limb["forearm"], "tail")
+        if foot or toe:
+            joints["toe" + suffix] = (toe or foot, "tail")
+            soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
+    if not soles:
+        return None
+    joints.update(_map_trunk(names, by_name, joints))
+    return RigMapping(joints=joints, soles=tuple(soles))
+
+
+_JOINT_HEADS = {
+    "hip": "thigh",
+    "knee": "shin",
+    "ankle": "foot",
+    "ball": "toe",
+    "shoulder": "upper_arm",
+    "elbow": "forearm",
+    "wrist": "hand",
+}
+"""Joint to the segment whose head it is."""
+
+
+def _settle_ambiguities(
+    limb: dict[str, str], names: list[BoneName], bones: Mapping[str, bpy.types.Bone], side: str
+) -> None:
+    """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
+    knee, leg = (best(names, (word,), side) for word in ("knee", "leg"))
+    if knee and leg and _is_ancestor(bones, leg, knee):
+        limb["shin"] = knee
+        limb["thigh"] = limb["thigh"] if limb["thigh"] and _is_ancestor(bones, limb["thigh"], leg) else leg
+    ankle, foot = (best(names, (word,), side) for word in ("ankle", "foot"))
+    if ankle and foot and _is_ancestor(bones, ankle, foot):
+        limb["foot"] = ankle
+        limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
+    toe, foot = limb["toe"], limb["foot"]
+    if toe and foot and (_is_ancestor(bones, toe, foot) or bones[foot].use_deform > bones[toe].use_deform):
+        limb["toe"] = ""
+
+
+_HIPS_OF_SOME = ("root", "cog", "spine")
+"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
+
+
+def _map_trunk(
+    names: list[BoneName], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, BoneEnd]
+) -> dict[str, BoneEnd]:
+    """Hips, spine, neck and head; the hips may also be where the thighs meet."""
+    by_joint = {joint: best(names, words, "") for joint, words in TRUNK.items()}
+    thighs = [bones[limbs[joint][0]] for joint in ("hip_l", "hip_r") if joint in limbs]
+    if not by_joint["hips"] or not bones[by_joint["hips"]].use_deform:
+        candidates = [by_joint["hips"], *(best(names, (word,), "") for word in _HIPS_OF_SOME)]
+        candidates.append(_common_ancestor([thigh.name for thigh in thighs], bones))
+        by_joint["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones)
+    top = by_joint["neck"] or by_joint["head"]
+    if by_joint["hips"] and top:
+        chain = _ancestors(bones, top)
+        if by_joint["hips"] in chain:
+            above = chain[: chain.index(by_joint["hips"])]
+            words = {name.bone: name.word for name in names}
+            trunk = [bone for bone in above if words.get(bone) not in TRUNK["neck"]]
+            by_joint["spine"] = trunk[-1] if trunk else ""
+    if by_joint["spine"] == by_joint["hips"]:
+        spines = sorted(
+            (name.number, name.bone)
+            for name in names
+            if name.word == "spine" and name.deforms and name.bone != by_joint["hips"]
+        )
+        by_joint["spine"] = spines[0][1] if spines else ""
+    return {joint: (bone, "head") for joint, bone in by_joint.items() if bone}
+
+
+def _ancestors(bones: Mapping[str, bpy.types.Bone], name: str) -> list[str]:
+    """Names of a bone's parents, nearest first."""
+    return [bone.name for bone in bones[name].parent_recursive]
+
+
+def _is_ancestor(bones: Mapping[str, bpy.types.Bone], ancestor: str, descendant: str) -> bool:
+    return ancestor in _ancestors(bones, descendant)
+
+
+def _common_ancestor(names: list[str], bones: Mapping[str, bpy.types.Bone]) -> str:
+    """Nearest bone that all of the given ones hang from; empty if there is none."""
+    if not names:
+        return ""
+    chains = [_ancestors(bones, name) for name in names]
+    return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")
+
+
+def _nearest_to_thighs(candidates: list[str], thighs: list[bpy.types.Bone], bones: Mapping[str, bpy.types.Bone]) -> str:
+    """The bone that starts nearest to the middle between the thighs, deforming ones first; empty without candidates."""
+    if not thighs or not candidates:
+        return candidates[0] if candidates else ""
+    middle = sum((thigh.head_local for thigh in thighs), start=Vector()) / len(thighs)
+    return min(candidates, key=lambda name: (not bones[name].use_deform, (bones[name].head_local - middle).length))

@@ -1,0 +1,1 @@
+"""Reads rigs, their skin and objects that print, frame by frame."""

@@ -1,0 +1,37 @@
+"""Poses of the bones that a response moves, from the recording of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.rig.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+class RigPoses:
+    """Some bones of a rig over time, and the armature in the world; filled while the rig is read.
+
+    Attributes
+    ----------
+    bones : tuple of str
+    matrices : dict of str to (F, 4, 4) float array
+        Pose of each bone in the armature's frame [Blender units].
+    world : (F, 4, 4) float array
+        Of the armature [Blender units].
+    """
+
+    world: Array
+
+    def __init__(self, bones: Sequence[str]) -> None:
+        self.bones = tuple(bones)
+        self.matrices: dict[str, Array] = {}
+
+    def take(self, recording: Recording) -> None:
+        """Copy the bones from a recording, whose other bones need not stay in memory."""
+        self.world = recording.world
+        for bone in self.bones:
+            self.matrices[bone] = np.swapaxes(recording.poses[:, recording.bones.index(bone)].astype(float), -1, -2)

@@ -1,0 +1,98 @@
+"""Objects that print with their own mesh, by whatever of it faces down: their surface and how it moves."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.motion.motion import Array
+from ...core.motion.sole_motion import SoleMotion
+from ...core.settings import SoleSource
+from ...core.soles.prop_motion import prop_motion
+from .. import mesh_arrays
+from ..rigs.libraries import check_libraries
+
+
+def check_props(
+    scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, ...], ground: bpy.types.Object | None = None
+) -> None:
+    """Raise InputError, naming the remedy, if an object that should print cannot.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    owner : str
+        Whose soles they are.
+    sources : tuple of SoleSource
+    ground : bpy.types.Object, optional
+        What they may not be: that which they print on.
+    """
+    for source in sources:
+        if not source.object:
+            continue
+        obj = next((obj for obj in scene.objects if obj.name_full == source.object), None)
+        if obj is None:
+            raise InputError(
+                f"Sole '{source.name}' of '{owner}': object '{source.object}' was deleted: choose another one, or "
+                "remove the contact."
+            )
+        check_libraries(obj)
+        if obj.type != "MESH":
+            raise InputError(f"'{obj.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")
+        if obj.mode == "EDIT":
+            raise InputError(f"'{obj.name}', which prints, is in Edit Mode: leave it with Tab first.")
+        if obj == ground:
+            raise InputError(
+                f"'{obj.name}' is the ground and cannot print on itself: choose another object for sole "
+                f"'{source.name}' of '{owner}', or another ground."
+            )
+
+
+def surface_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
+    """Vertices (V, 3) and triangles (T, 3) of a mesh object in its own frame, with its modifiers.
+
+    Without them where the object is hidden in the scene: Blender does not evaluate it then.
+
+    Raises
+    ------
+    InputError
+        If it has no faces.
+    """
+    scene.view_layers[0].update()
+    depsgraph = scene.view_layers[0].depsgraph
+    evaluated = obj.evaluated_get(depsgraph) if depsgraph else obj
+    mesh = evaluated.to_mesh()
+    try:
+        vertices, triangles = mesh_arrays.positions(mesh), mesh_arrays.triangles(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    if not len(triangles):
+        raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or choose another object.")
+    if not np.isfinite(vertices).all():
+        raise InputError(
+            f"The mesh of '{obj.name}' has vertices without a valid position (NaN or infinite): delete them."
+        )
+    return vertices.astype(float), triangles
+
+
+def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
+    """An object of the scene that prints with its own mesh, and its volume [m³]: its `prop_motion`.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    source : SoleSource
+        Names the object.
+    matrices : (F, 4, 4) float array
+        Its frame to the world over time [m].
+
+    Raises
+    ------
+    InputError
+        If its mesh has no faces, or its scale is 0 or changes.
+    """
+    obj = next(obj for obj in scene.objects if obj.name_full == source.object)
+    vertices, triangles = surface_of(scene, obj)
+    return prop_motion(vertices, triangles, matrices, owner=obj.name, name=source.name, side=source.side)

@@ -1,0 +1,209 @@
+"""The skin of a rig as it is read: its meshes in the rest pose, and the weights by which bones move them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.motion.motion import Array
+from ...core.numerics.slices import Slices, sliced
+from ...core.rig.rig_skin import Indices, RigSkin, Shape
+from .. import mesh_arrays
+from ..rigs.libraries import check_libraries
+from ..settings import ObjectName, found, name_of
+from .seen_mesh import as_seen, left_out
+
+_SLICE = 2_000
+"""Vertices whose weights are read in one slice."""
+
+_LEAST_WEIGHT = 1e-4
+"""Weights that come to less leave a vertex where its object is, as in Blender's armature deformation."""
+
+
+def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
+
+    Beside rendered ones, those that are not are mostly stand-ins.
+    """
+    worn = _worn_by(scene, armature)
+    return [obj for obj in worn if not obj.hide_render] or worn
+
+
+def hidden_on(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
+    """The meshes on some bones of an armature that `meshes_on` leaves out, as they are not rendered."""
+    read = meshes_on(scene, armature)
+    return [obj for obj in _worn_by(scene, armature) if obj not in read and _is_on(obj, bones)]
+
+
+def left_out_on(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
+    """What shapes the meshes on some bones and is not read, by the name of the mesh."""
+    on_bones = (obj for obj in meshes_on(scene, armature) if _is_on(obj, bones))
+    return {obj.name: names for obj in on_bones if (names := left_out(obj))}
+
+
+def _is_on(obj: bpy.types.Object, bones: Collection[str]) -> bool:
+    return obj.parent_bone in bones or bool({group.name for group in obj.vertex_groups} & set(bones))
+
+
+def _worn_by(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    return [
+        obj for obj in scene.objects if obj.type == "MESH" and (_deformed_by(obj, armature) or _hangs(obj, armature))
+    ]
+
+
+def _deformed_by(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return any(m.type == "ARMATURE" and m.object == armature for m in obj.modifiers) or (
+        obj.parent == armature and obj.parent_type == "ARMATURE"
+    )
+
+
+def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return obj.parent == armature and obj.parent_type == "BONE" and obj.parent_bone in armature.data.bones
+
+
+@sliced
+def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigSkin | None]:
+    """The meshes on an armature that `meshes_on` names, or None where there is none.
+
+    Raises
+    ------
+    InputError
+        If one is being edited.
+    """
+    pieces, rig = [], name_of(armature)
+    for name in [name_of(obj) for obj in meshes_on(scene, armature)]:
+        obj, armature = found(name), found(rig)
+        if obj.mode == "EDIT":
+            raise InputError(f"'{obj.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first.")
+        check_libraries(obj)
+        with as_seen(obj) as (seen, shapes):
+            if not len(_mesh_of(found(seen)).polygons):
+                continue
+            if _hangs(obj, armature):
+                pieces.append(_hung(found(seen), armature, shapes))
+            else:
+                pieces.append((yield from _deformed(seen, shapes, name, rig)))
+        yield
+    if not pieces:
+        return None
+    bones = tuple(dict.fromkeys(name for piece in pieces for name in piece.names))
+    place = {name: number for number, name in enumerate(bones)}
+    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    vertex = np.concatenate([piece.vertex + start for piece, start in zip(pieces, first[:-1], strict=True)])
+    numbers = [np.array([place[name] for name in piece.names], dtype=np.intp) for piece in pieces]
+    bone = np.concatenate([number[piece.group] for number, piece in zip(numbers, pieces, strict=True)])
+    weight = np.concatenate([piece.weight for piece in pieces])
+    return RigSkin(
+        vertices=np.concatenate([piece.vertices for piece in pieces]),
+        triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, first[:-1], strict=True)]),
+        bones=bones,
+        weights=tuple((vertex[bone == number], weight[bone == number]) for number in range(len(bones))),
+        part=_dominant(vertex, bone, weight, int(first[-1]), len(bones)),
+        hung=np.concatenate([np.full(len(piece.vertices), piece.hung) for piece in pieces]),
+        shapes=tuple(
+            replace(shape, vertices=shape.vertices + start)
+            for piece, start in zip(pieces, first[:-1], strict=True)
+            for shape in piece.shapes
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """One mesh: its vertices in the armature's space, and the weights that bones have on them."""
+
+    vertices: Array
+    triangles: Indices
+    names: tuple[str, ...]
+    vertex: Indices
+    group: Indices
+    weight: Array
+    shapes: tuple[Shape, ...]
+    hung: bool = False
+
+
+def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+    mesh = obj.data
+    assert isinstance(mesh, bpy.types.Mesh), obj.name
+    return mesh
+
+
+def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape, ...]) -> _Piece:
+    mesh, bone = _mesh_of(obj), armature.data.bones[obj.parent_bone]
+    parent = np.eye(4)
+    if not bone.use_relative_parent:
+        parent = np.array(bone.matrix_local)
+        parent[:3, 3] += parent[:3, 1] * bone.length
+    to_armature = parent @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis)
+    count = len(mesh.vertices)
+    return _Piece(
+        _moved(to_armature, mesh_arrays.positions(mesh)),
+        mesh_arrays.triangles(mesh),
+        (bone.name,),
+        np.arange(count),
+        np.zeros(count, dtype=np.intp),
+        np.ones(count),
+        _turned(to_armature, shapes),
+        hung=True,
+    )
+
+
+def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, rig: ObjectName) -> Slices[_Piece]:
+    """A mesh of that name where the object `placed` is."""
+    vertex, group, weight = yield from _weights(name)
+    obj, armature = found(name), found(rig)
+    mesh, bones = _mesh_of(obj), armature.data.bones
+    count = len(mesh.vertices)
+    names = tuple(group.name for group in obj.vertex_groups)
+    if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
+        raise InputError(f"'{obj.name}' was changed while it was read: try again.")
+    deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])[group]
+    vertex, group, weight = vertex[deforms], group[deforms], weight[deforms]
+    used, group = np.unique(group, return_inverse=True)
+    total = np.bincount(vertex, weight, count)
+    held = total[vertex] > _LEAST_WEIGHT
+    to_armature = np.array(armature.matrix_world.inverted_safe() @ found(placed).matrix_world)
+    return _Piece(
+        _moved(to_armature, mesh_arrays.positions(mesh)),
+        mesh_arrays.triangles(mesh),
+        tuple(names[number] for number in used),
+        vertex[held],
+        group[held],
+        weight[held] / total[vertex[held]],
+        _turned(to_armature, shapes),
+    )
+
+
+def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
+    """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
+    read, tables = 0, [np.empty((0, 3))]
+    while read < len(vertices := _mesh_of(found(name)).vertices):
+        some = enumerate(vertices[read : read + _SLICE], read)
+        entries = [x for index, vertex in some for each in vertex.groups for x in (index, each.group, each.weight)]
+        tables.append(np.array(entries, dtype=float).reshape(-1, 3))
+        read += _SLICE
+        yield
+    table = np.concatenate(tables)
+    return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
+
+
+def _moved(transform: Array, points: NDArray[np.float32]) -> Array:
+    return np.asarray(points @ transform[:3, :3].T + transform[:3, 3], dtype=float)
+
+
+def _turned(transform: Array, shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    return tuple(replace(shape, offset=shape.offset @ transform[:3, :3].T) for shape in shapes)
+
+
+def _dominant(vertex: Indices, bone: Indices, weight: Array, count: int, none: int) -> Indices:
+    """The bone with the largest weight on each vertex."""
+    order = np.lexsort((weight, vertex))
+    last = np.flatnonzero(np.diff(vertex[order], append=-1))
+    part = np.full(count, none, dtype=np.intp)
+    part[vertex[order[last]]] = bone[order[last]]
+    return part

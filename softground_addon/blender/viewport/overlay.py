@@ -1,0 +1,246 @@
+"""The overlay in the viewport: predicted footfalls, soles, forces, and the cells of the frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from .. import jobs, session, settings
+from ..live import live
+from ..operators import baked_steps, prediction
+from ..operators.modal_bake import Reading, ReadingShot
+from ..reading import analysis
+from ..reading.analysis import Analysis
+from ..state import state
+from . import overlay_shapes
+from .overlay_shapes import Cells, Outline
+
+Array = NDArray[np.float64]
+Colour = tuple[float, float, float, float]
+
+SIDES: dict[str, Colour] = {"L": (0.25, 0.6, 1.0, 1.0), "R": (1.0, 0.35, 0.3, 1.0), "": (0.9, 0.8, 0.3, 1.0)}
+FORCES: dict[str, Colour] = {
+    "weight": (0.3, 0.85, 0.35, 1.0),
+    "momentum": (1.0, 0.75, 0.15, 1.0),
+    "total": (0.95, 0.2, 0.2, 1.0),
+}
+CONTACT: Colour = (0.95, 0.25, 0.2, 0.45)
+RIM: Colour = (0.25, 0.75, 0.95, 0.35)
+LINE, BOLD_LINE = 1.5, 3.0
+"""Widths of lines [px, before the interface's scale]."""
+HEAD = 0.15
+"""Length of an arrow's head, in lengths of the arrow."""
+PATIENCE = 0.5
+"""Time from when the overlay cannot be read anew, as a bake runs, until it is tried again [s]."""
+TEXT_SIZE = 13
+"""Size of the numbers [px, before the interface's scale]."""
+
+
+"""The footfalls of each shot that was shown, as long as it is known."""
+
+
+def _footfalls(known: Analysis) -> list[Outline]:
+    if known not in state.outlines:
+        state.outlines[known] = overlay_shapes.footfalls(known.loads, known.shot.terrain)
+    return state.outlines[known]
+
+
+def draw_shapes() -> None:
+    """Draw lines and faces in world space; for the viewport's draw handler."""
+    panel = session.current()
+    context: Any = bpy.context
+    if not panel.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
+        return
+    predicted = prediction.of(settings.scene_of(context))
+    if predicted is None:
+        return
+    known = predicted.analysis
+    import gpu  # noqa: PLC0415  (not there in background)
+
+    scene = settings.scene_of(context)
+    frame = float(scene.frame_current)
+    metre = 1.0 / scene.unit_settings.scale_length
+    gpu.state.blend_set("ALPHA")
+    try:
+        if panel.show_cells:
+            contact, rim, size = _cells(scene)
+            for cells, colour in ((contact, CONTACT), (rim, RIM)):
+                _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
+        if panel.show_footfalls:
+            for outline in _footfalls(known):
+                draw_line(closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
+        if panel.show_soles:
+            for outline in overlay_shapes.soles(known.loads, frame):
+                draw_line(closed(outline.points) * metre, SIDES[outline.side], BOLD_LINE)
+        if panel.show_forces:
+            for arrow in overlay_shapes.arrows(known.loads, frame):
+                _arrow(arrow.start * metre, arrow.end * metre, FORCES[arrow.kind])
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def draw_numbers() -> None:
+    """Number the footfalls; for the viewport's draw handler in pixels."""
+    panel = session.current()
+    context: Any = bpy.context
+    if not (panel.show_overlay and panel.show_footfalls) or not context.space_data.overlay.show_overlays:
+        return
+    predicted = prediction.of(settings.scene_of(context))
+    if predicted is None:
+        return
+    known = predicted.analysis
+    import blf  # noqa: PLC0415
+    from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
+
+    metre = 1.0 / settings.scene_of(context).unit_settings.scale_length
+    blf.size(0, TEXT_SIZE * context.preferences.system.ui_scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+    for number, outline in enumerate(_footfalls(known), start=1):
+        place = location_3d_to_region_2d(context.region, context.region_data, Vector((outline.middle * metre).tolist()))
+        if place is None:
+            continue
+        text = f"{number}"
+        width, height = blf.dimensions(0, text)
+        blf.position(0, place.x - width / 2, place.y - height / 2, 0)
+        blf.color(0, *SIDES[outline.side])
+        blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
+    """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
+    shown = live.in_contact(scene)
+    if shown is not None:
+        windows, size, reach = shown
+        touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
+    else:
+        bake = baked_steps.bake_on(scene.softground.ground)
+        reach, size = bake.rim_reach, bake.footprints[0].cell_size if bake.footprints else 1.0
+        touched = list(overlay_shapes.touched_at(bake.footprints, float(scene.frame_current)))
+    return *overlay_shapes.contact_and_rim(touched, reach / size), size
+
+
+def draw_line(points: Array, colour: Colour, width: float) -> None:
+    """A line through points (N, 3) in the units of the scene, of a width [px]."""
+    import gpu  # noqa: PLC0415
+    from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
+
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    viewport: Any = gpu.state.viewport_get()
+    shader.uniform_float("viewportSize", viewport[2:])
+    shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
+    shader.uniform_float("color", colour)
+    content: Any = {"pos": points.astype(np.float32)}
+    batch_for_shader(shader, "LINE_STRIP", content).draw(shader)
+
+
+def _fill(triangles: Array, colour: Colour) -> None:
+    import gpu  # noqa: PLC0415
+    from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
+
+    if not len(triangles):
+        return
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", colour)
+    content: Any = {"pos": triangles.astype(np.float32)}
+    batch_for_shader(shader, "TRIS", content).draw(shader)
+
+
+def _arrow(start: Array, end: Array, colour: Colour) -> None:
+    """A line with a head that faces the viewer."""
+    context: Any = bpy.context
+    view = np.array(context.region_data.view_matrix.inverted().col[2][:3])
+    along = end - start
+    aside = np.cross(along, view)
+    length = float(np.linalg.norm(aside))
+    draw_line(np.stack([start, end]), colour, BOLD_LINE)
+    if length > 0:
+        base = end - HEAD * along
+        wing = aside / length * float(np.linalg.norm(along)) * HEAD / 2
+        _fill(np.stack([end, base + wing, base - wing]), colour)
+
+
+def closed(points: Array) -> Array:
+    """An outline (N, 3) that ends where it begins."""
+    return np.concatenate([points, points[:1]])
+
+
+def _faded(colour: Sequence[float], alpha: float) -> Colour:
+    return (colour[0], colour[1], colour[2], colour[3] * alpha)
+
+
+class SOFTGROUND_OT_overlay(ReadingShot):
+    """Show or hide predicted footfalls, soles, forces and cells in the viewport"""
+
+    bl_idname = "softground.overlay"
+    bl_label = "Footfall Overlay"
+    cancelled = "The overlay stays hidden"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
+        return _showing(scene)
+
+    def _show(self, result: bool) -> None:
+        session.current().show_overlay = result
+        session.redraw()
+        session.redraw(region_type="WINDOW")
+
+
+def _showing(scene: bpy.types.Scene) -> jobs.Job[bool]:
+    shown = session.current().show_overlay
+    if not shown:
+        yield from analysis.reading(scene)
+    return not shown
+
+
+class SOFTGROUND_OT_read_again(Reading):
+    """Read the edited animation again for the overlay. Esc cancels"""
+
+    bl_idname = "softground.read_again"
+    bl_label = "Read Animation"
+    bl_options = {"INTERNAL"}
+    cancelled = "The overlay shows nothing until the next edit"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
+        return _read_if_possible(scene)
+
+    def _show(self, _result: bool) -> None:
+        session.redraw(region_type="WINDOW")
+
+
+def _read_if_possible(scene: bpy.types.Scene) -> jobs.Job[bool]:
+    with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+        yield from analysis.reading(scene)
+    return analysis.known(scene) is not None
+
+
+def read_again() -> float | None:
+    """Predict anew after an edit, for a timer."""
+    windows = bpy.context.window_manager.windows
+    if not session.current().show_overlay or not windows:
+        return None
+    if not bpy.ops.softground.read_again.poll():
+        return PATIENCE
+    with bpy.context.temp_override(window=windows[0]):
+        bpy.ops.softground.read_again("INVOKE_DEFAULT")
+    return None
+
+
+DRAWN = ((draw_shapes, "POST_VIEW"), (draw_numbers, "POST_PIXEL"))
+"""What is drawn over viewports, and when."""
+
+
+def unregister() -> None:
+    """Read nothing again any more."""
+    if bpy.app.timers.is_registered(read_again):
+        bpy.app.timers.unregister(read_again)
+
+
+CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again)

@@ -1,0 +1,375 @@
+"""Operators on single steps of the bake: choose some, mute, change and copy them, take the changes back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from math import degrees, radians
+from typing import Any, ClassVar
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ...core.errors import InputError
+from ...core.record.edits import (
+    FARTHEST,
+    LARGEST,
+    LONGEST_SHIFT,
+    SMALLEST,
+    STRONGEST,
+    StepEdit,
+    mesh_soles,
+    new_copy,
+    with_edit,
+    with_meshes,
+)
+from ...core.record.mesh_sole import MeshSole
+from .. import jobs, session, settings
+from ..baking import step_edits, step_soles
+from ..ground import baked_ground
+from ..live import live
+from ..operator_base import OnBake
+from ..operators import baked_steps, show_prints
+from ..operators.baked_steps import BakedStep
+from ..operators.modal_bake import STAGE_NAMES, ModalJob
+from ..reading import analysis
+
+
+class OnSteps(OnBake):
+    """Operators that change steps of the bake on the ground."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is a bake, and neither another one nor live mode is at work."""
+        if session.current().is_baking or live.is_on():
+            cls.poll_message_set("A bake is running, or live mode is on: wait, or press Keep or Discard first")
+            return False
+        return super().poll(context)
+
+
+class OnStep(OnSteps):
+    """Operators that change the steps that are named, or chosen."""
+
+    step: StringProperty(
+        name="Steps", description="Ids of the steps, one per line; the selected ones if empty", options={"HIDDEN"}
+    )
+
+    def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
+        """The steps that are meant, first the one that the panel shows."""
+        if not self.step:
+            self.step = "\n".join(step.name for step in baked_steps.chosen(scene))
+        if not self.step:
+            raise InputError("Select a step first, in the list of steps.")
+        steps = {step.name: step for step in baked_steps.of(scene)}
+        for name in self.step.split("\n"):
+            if name not in steps:
+                raise InputError(f"The bake has no step '{name}': select one in the list of steps.")
+        return [steps[name] for name in self.step.split("\n")]
+
+
+def redraw() -> None:
+    """Draw the panels and the steps in the viewport again."""
+    session.redraw()
+    session.redraw(region_type="WINDOW")
+
+
+class EditJob(ModalJob):
+    """Operators that press steps again and write the ground."""
+
+    stage_names: ClassVar[dict[str, str]] = STAGE_NAMES | {"sample": "Reading the bake"}
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        return analysis.own_changes(scene)
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
+        return _edited(scene, *self.wanted(scene))
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        """All edits that the bake is to have, and the steps that are chosen then, none for those that are."""
+        raise NotImplementedError
+
+    def _show(self, result: list[str]) -> None:
+        if result:
+            session.choose_steps(result[0], result)
+        redraw()
+
+
+def _edited(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], chosen: list[str]) -> jobs.Job[list[str]]:
+    if edits != baked_ground.record_of(scene.softground.ground).edits:
+        bake = yield from step_edits.reading(scene)
+        yield from step_edits.editing(scene, bake, edits)
+    return chosen
+
+
+def changed(scene: bpy.types.Scene, changes: Iterable[tuple[BakedStep, StepEdit | None]]) -> dict[str, StepEdit]:
+    """All edits of the bake, with others of some steps; see `edits.with_edit`."""
+    edits = dict(baked_ground.edits_of(scene.softground.ground))
+    for step, edit in changes:
+        edits = with_edit(edits, step.baked, step.name, edit)
+    return edits
+
+
+def copied(
+    scene: bpy.types.Scene, copies: Iterable[tuple[BakedStep, StepEdit]]
+) -> tuple[dict[str, StepEdit], list[str]]:
+    """All edits of the bake with copies of some steps, and their names."""
+    edits, names = dict(baked_ground.edits_of(scene.softground.ground)), []
+    for step, edit in copies:
+        names.append(new_copy(edits, step.baked))
+        edits[names[-1]] = edit
+        if edit.mesh is not None:
+            edits = with_meshes(edits, {edit.sole: edit.mesh})
+    return edits, names
+
+
+def toggle(name: str) -> None:
+    """Choose a step with those that are chosen, or no more."""
+    names = [one for one in session.chosen_steps() if one != name]
+    if len(names) == len(session.chosen_steps()):
+        names.insert(0, name)
+    session.choose_steps(names[0] if names else "", names)
+
+
+class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
+    """Select this step, go to the frame where its foot has left the print, and centre the view on it.
+    Shift: add it to the selection, or remove it"""
+
+    bl_idname = "softground.choose_step"
+    bl_label = "Select Step"
+    bl_options = {"INTERNAL"}
+
+    step: StringProperty(name="Step", description="Id of the step", options={"HIDDEN"})
+    extend: BoolProperty(name="Extend", description="Add it to the selection, or remove it", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.extend = event.shift
+        return self.execute(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        step = next((one for one in baked_steps.of(scene) if one.name == self.step), None)
+        if step is None:
+            return {"CANCELLED"}
+        if self.extend:
+            toggle(step.name)
+        else:
+            session.choose_steps(step.name)
+        if step.name in session.chosen_steps():
+            scene.frame_set(step.there_from)
+            show_prints.centre(scene, context.area, step)
+        session.redraw()
+        session.redraw(region_type="WINDOW")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_mute_step(OnStep, EditJob):
+    """Take the print of this step out of the ground, or put it back. Esc cancels"""
+
+    bl_idname = "softground.mute_step"
+    bl_label = "Mute Step"
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        steps = self.chosen(scene)
+        mute = not steps[0].edit.mute
+        return changed(scene, [(step, replace(step.edit, mute=mute)) for step in steps]), []
+
+
+def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
+    """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
+    scene = settings.scene_of(context)
+    steps = baked_steps.of(scene)
+    meshes = {*step_soles.names(scene), *mesh_soles({step.name: step.edit for step in steps})}
+    names = [*sorted(steps[0].feet if steps else ()), *sorted(meshes)]
+    return [name for name in names if text.lower() in name.lower()]
+
+
+def _sole_property() -> Any:
+    return StringProperty(
+        name="Sole",
+        description="What presses the step: a foot of this bake, also of another character, or a mesh as it stands in "
+        "the scene, with its toes along -Y. Its own sole if empty",
+        search=_soles,
+    )
+
+
+class SOFTGROUND_OT_change_step(OnStep, EditJob):
+    """Change depth, place, angle, size, sole and time of this step. Esc cancels"""
+
+    bl_idname = "softground.change_step"
+    bl_label = "Change Step"
+    _in_dialog = False
+
+    strength: FloatProperty(
+        name="Depth", description="Depth relative to the baked print", default=1.0, min=0.0, max=STRONGEST, soft_max=3.0
+    )
+    move: FloatVectorProperty(
+        name="Move",
+        description="Distance along the scene's X and Y, in metres",
+        size=2,
+        min=-FARTHEST,
+        max=FARTHEST,
+        step=1,
+        precision=3,
+    )
+    turn: FloatProperty(
+        name="Rotate",
+        description="Angle by which the print is turned counter-clockwise",
+        subtype="ANGLE",
+        min=radians(-360),
+        max=radians(360),
+    )
+    scale: FloatProperty(
+        name="Size",
+        description="Size relative to the baked sole; the pressure stays the same",
+        default=1.0,
+        min=SMALLEST,
+        max=LARGEST,
+    )
+    sole: _sole_property()
+    shift: IntProperty(
+        name="Delay",
+        description="Frames by which the step is later; negative is earlier",
+        min=-LONGEST_SHIFT,
+        max=LONGEST_SHIFT,
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        try:
+            edit = self.chosen(settings.scene_of(context))[0].edit
+        except InputError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.strength, self.move, self.turn = edit.strength, edit.move_m, radians(edit.turn_deg)
+        self.scale, self.shift, self.sole = edit.scale, edit.shift_frames, edit.sole
+        self._in_dialog = True
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        run = self._start if self._in_dialog else super().execute  # which Adjust Last Operation calls
+        self._in_dialog = False
+        result: set[str] = run(context)
+        return result
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        steps = self.chosen(scene)
+        wanted = {
+            "strength": settings.typed(self.strength),
+            "move_m": (settings.typed(self.move[0]), settings.typed(self.move[1])),
+            "turn_deg": settings.typed(degrees(self.turn)),
+            "scale": settings.typed(self.scale),
+            "shift_frames": self.shift,
+            "sole": self.sole,
+        }
+        # of several steps, only what was changed of the first
+        new = {key: value for key, value in wanted.items() if value != getattr(steps[0].edit, key)}
+        mesh = None
+        if "sole" in new:
+            new["mesh"] = mesh = _mesh(scene, steps, self.sole)
+        edits = changed(scene, [(step, replace(step.edit, **new)) for step in steps])
+        return with_meshes(edits, {self.sole: mesh}) if mesh else edits, []
+
+
+def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> MeshSole | None:
+    """The sole of the mesh that is to press some steps; None for a foot of the bake, and for their own.
+
+    Raises
+    ------
+    InputError
+        If it cannot press them.
+    """
+    if not sole:
+        return None
+    for step in steps:
+        if not step.has_foot:
+            raise InputError(
+                f"Step '{step.name}' was not made by a foot, so it keeps its sole: select only steps of feet."
+            )
+    if sole in steps[0].feet:
+        return None
+    obj = step_soles.object_of(scene, sole)
+    kept = mesh_soles(baked_ground.edits_of(scene.softground.ground))
+    if obj is None and sole not in kept:
+        feet = ", ".join(sorted(steps[0].feet)) or "none"
+        raise InputError(f"The bake has no sole '{sole}': choose one of {feet}, or a mesh object in this scene.")
+    if obj is None:
+        return kept[sole]
+    return step_soles.read(obj, scene.softground.ground, scene.unit_settings.scale_length)
+
+
+class SOFTGROUND_OT_duplicate_step(OnStep, EditJob):
+    """Press a copy of this step just ahead of it; the copy can be moved, changed and deleted. Esc cancels"""
+
+    bl_idname = "softground.duplicate_step"
+    bl_label = "Duplicate"
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        return copied(scene, [(step, _moved(step, step.ahead())) for step in self.chosen(scene)])
+
+
+class SOFTGROUND_OT_add_step(OnStep, EditJob):
+    """Press this step at the 3D cursor too, starting at the current frame. Choose its sole in Adjust Last Operation"""
+
+    bl_idname = "softground.add_step"
+    bl_label = "Add at Cursor"
+
+    sole: _sole_property()
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.sole = ""  # that of the step, and not what was chosen for the one before
+        return super().invoke(context, event)
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        step = self.chosen(scene)[0]
+        cursor = np.array(scene.cursor.location)[:2] * scene.unit_settings.scale_length
+        edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
+        shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
+        if abs(shift) > LONGEST_SHIFT:
+            raise InputError(
+                f"Step '{step.name}' is {abs(shift)} frames away; a copy can be at most {LONGEST_SHIFT} earlier or "
+                "later: go to a nearer frame, or choose another step."
+            )
+        if self.sole:
+            edit = replace(edit, sole=self.sole, mesh=_mesh(scene, [step], self.sole))
+        return copied(scene, [(step, replace(edit, mute=False, shift_frames=shift))])
+
+
+def _moved(step: BakedStep, move: Sequence[float]) -> StepEdit:
+    """The edit of a step, with another move [m]."""
+    if max(map(abs, move)) > FARTHEST:
+        raise InputError(
+            f"That is more than {FARTHEST:g} m from step '{step.name}': place it nearer, or choose another step."
+        )
+    return replace(step.edit, move_m=(settings.typed(move[0]), settings.typed(move[1])))
+
+
+class SOFTGROUND_OT_reset_step(OnStep, EditJob):
+    """Restore the baked print of this step; a copy is deleted. Esc cancels"""
+
+    bl_idname = "softground.reset_step"
+    bl_label = "Reset Step"
+
+    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        return changed(scene, [(step, None) for step in self.chosen(scene)]), []
+
+
+class SOFTGROUND_OT_reset_steps(OnSteps, EditJob):
+    """Restore all baked prints, and delete all copies. Esc cancels"""
+
+    bl_idname = "softground.reset_steps"
+    bl_label = "Reset All Steps"
+
+    def wanted(self, _scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+        return {}, []
+
+
+CLASSES = (
+    SOFTGROUND_OT_choose_step,
+    SOFTGROUND_OT_mute_step,
+    SOFTGROUND_OT_change_step,
+    SOFTGROUND_OT_duplicate_step,
+    SOFTGROUND_OT_add_step,
+    SOFTGROUND_OT_reset_step,
+    SOFTGROUND_OT_reset_steps,
+)

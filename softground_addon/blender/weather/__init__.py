@@ -1,0 +1,1 @@
+"""Weather on a baked ground: added, keyed, renewed, and read at points."""

@@ -1,0 +1,265 @@
+"""Weather over a bake: put on the ground that carries it, made to fit the record, set from presets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.playback.keyframe_tables import NO_CONTACT
+from ...core.record.footprints import Footprint
+from ...core.record.record import BakeRecord
+from ...core.settings import BakeSettings
+from ...core.weather.felt_weather import felt_in
+from ...core.weather.weather import Matter, Span, matter_of, moment_of, span_of
+from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
+from .. import compat, jobs, settings
+from ..ground import baked_ground, ground_mesh
+from ..playback import own_data, weather_modifier, weather_table
+from ..playback import playback_nodes as played
+from ..playback import weather_nodes as nodes
+from ..playback.weather_course_nodes import HOLLOWS
+from . import weather_keys
+
+Array = NDArray[np.float64]
+
+READING = jobs.Progress("sample", 0.5)
+
+PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "SNOWFALL": (
+        "Snowfall",
+        {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
+    ),
+    "THAW": ("Thaw", {"Temperature": 3.0, "Time Scale": 20_000.0}),
+    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 60.0}),
+    "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
+    "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),
+}
+"""Title of each preset, and its inputs where they are not as in a new group. Ten seconds show a night of snow, two days
+of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
+
+
+def add(ground: bpy.types.Object, left: BakeRecord | None = None) -> Any:
+    """Put weather on a ground with a bake, or renew what there is, at once; the modifier. See `adding`."""
+    return jobs.run(adding(ground, left))
+
+
+def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str = "") -> jobs.Job[Any]:
+    """Put weather on a ground with a bake, or renew what there is, in the last step; the modifier.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    left : BakeRecord, optional
+        What its bake left, where that need not be read.
+    preset : str, optional
+        One of `PRESETS` to set it to.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record does not say what is needed.
+    """
+    name = settings.name_of(ground)
+    _check_names(baked_ground.display_mesh_of(ground))
+    footprints, about = (left.edited, left.about) if left else baked_ground.load(ground)
+    places = yield from _places(ground, footprints, about)
+    ground = settings.found(name)
+    display_mesh = baked_ground.display_mesh_of(ground)
+    there: Any = weather_modifier.modifier_of(display_mesh)
+    if there:
+        weather_modifier.separate(there)
+    tree = there.node_group if there else nodes.new()
+    try:
+        _fit(ground, display_mesh, tree, footprints, about, places)
+    except BaseException:
+        weather_modifier.remove_unused()
+        raise
+    modifier = there or weather_modifier.put(display_mesh, tree)
+    weather_keys.follow(display_mesh)
+    if preset:
+        set_preset(modifier, preset)
+    return modifier
+
+
+def values_of(ground: bpy.types.Object) -> dict[str, float]:
+    """What the sliders of a ground's weather are at; nothing where there is none."""
+    modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    return {} if modifier is None else weather_keys.values_of(modifier)
+
+
+def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
+    """Fit weather to what a new bake left, with the values that the ground had before it; nothing if it had none."""
+    there = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    if there is None and not values:
+        return
+    modifier = add(ground, left)
+    if there is None:
+        _set(modifier, values)
+
+
+def set_preset(modifier: Any, preset: str) -> None:
+    """Set all inputs of a weather modifier as one of `PRESETS` has them."""
+    _set(modifier, {**{name: value for name, value, *_ in nodes.INPUTS}, **PRESETS[preset][1]})
+
+
+def _set(modifier: Any, values: Mapping[str, float]) -> None:
+    for name, identifier in weather_modifier.inputs_of(modifier).items():
+        if name in values:
+            compat.write_input(modifier, identifier, float(values[name]))
+    modifier.id_data.update_tag()
+
+
+def _check_names(display_mesh: bpy.types.Object) -> None:
+    mesh = ground_mesh.mesh_of(display_mesh)
+    taken = [one for one in nodes.OF_WEATHER if one in mesh.attributes and one not in own_data.made(mesh)]
+    if taken:
+        raise InputError(
+            f"'{display_mesh.name}' has an attribute '{taken[0]}' of your own: rename it, as weather needs that name."
+        )
+
+
+def felt(wanted: BakeSettings) -> BakeSettings:
+    """Settings with the weather that is on their ground, where steps feel it."""
+    ground = settings.find(wanted.ground) if wanted.weather and wanted.ground else None
+    modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
+    if wanted.weather is None or modifier is None or modifier.node_group is None:
+        return wanted
+    first, last = (frame * wanted.time_stretch for frame in wanted.frames)
+    return replace(wanted, weather=replace(wanted.weather, **weather_keys.rates(modifier, span_of(first, last))))
+
+
+def _fit(
+    ground: bpy.types.Object,
+    display_mesh: bpy.types.Object,
+    tree: Any,
+    footprints: list[Footprint],
+    about: Mapping[str, Any],
+    places: WeatherPlaces,
+) -> None:
+    """Write what the group reads, and fill it."""
+    with damage_named(ground):
+        inputs = about["inputs"]
+        (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
+        stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
+        first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
+    up = ground_mesh.up_of(display_mesh, unit_scale)
+    since = places.times[:, 1]
+    span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
+    mesh = ground_mesh.mesh_of(display_mesh)
+    hollows = store(mesh, places, matter, span)
+    given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
+    again, has_water = (name in mesh.attributes for name in (nodes.AGAIN, nodes.WATER))
+    nodes.build(tree, **given, felt=known["felt"], again=again, has_water=has_water)
+    if table := hollows_of(tree):
+        weather_table.fill(table, hollows)
+    tree[weather_keys.LAST] = span.last
+
+
+@contextmanager
+def damage_named(ground: bpy.types.Object) -> Iterator[None]:
+    """InputError in place of what the damaged inputs of a bake raise where they are read."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+        raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
+
+
+def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], Matter]:
+    """What `weather_places` takes of a bake, and how its ground takes weather.
+
+    By its footprints and what its record says about it; raises what `units_of` and `baked_with` of `baked_ground` do
+    for damage.
+    """
+    inputs = about["inputs"]
+    units = baked_ground.units_of(inputs)
+    material = {name: baked_ground.baked_with(about, name) for name in ("blur_sigma", "layer_depth")}
+    matter = matter_of(str(inputs["surface"]), material["layer_depth"], section_of(footprints))
+    material["layer_depth"] *= baked_ground.baked_with(about, "densest") or 1.0  # how far it can be pressed
+    known = {
+        "cell_size": units["cell_size_m"],
+        "time_stretch": units["time_stretch"],
+        "felt": felt_in(inputs) is not None,
+        "puddles": matter.soaking is not None,
+        **material,
+    }
+    return known, matter
+
+
+def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mapping[str, Any]) -> jobs.Job[WeatherPlaces]:
+    """What weather needs to know of the vertices."""
+    display_mesh = baked_ground.display_mesh_of(ground)
+    with damage_named(ground):
+        (known, _), unit_scale = of_bake(footprints, about), baked_ground.units_of(about["inputs"])["unit_scale_m"]
+    name = settings.name_of(display_mesh)
+    position = ground_mesh.undisturbed_surface(display_mesh, unit_scale).vertices
+    yield READING
+    display_mesh = settings.found(name)
+    mesh, up = ground_mesh.mesh_of(display_mesh), ground_mesh.up_of(display_mesh, unit_scale)
+    rest = ground_mesh.rest_positions(mesh).astype(np.float64)
+    relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)
+    start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))
+    last[last >= NO_CONTACT] = -NO_CONTACT
+    start[start <= -NO_CONTACT] = NO_CONTACT
+    del mesh, display_mesh
+    working = weather_places.slices(footprints, position, relief, start, np.maximum(end, last), **known)
+    return (yield from jobs.meanwhile(READING, working))
+
+
+def hollows_of(tree: Any) -> Any:
+    """The table of the hollows that a group of weather fills; None where no water stands."""
+    return weather_table.named(nodes.within(tree), HOLLOWS)
+
+
+def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> dict[str, NDArray[np.float64]]:
+    """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for.
+
+    Returns
+    -------
+    dict of arrays
+        The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
+    """
+    pressed, since, compacted = places.times.T
+    capacity, above, left = places.pool.T
+    rise, filled = places.levels[:, :POWERS], 1 + moment_of(places.levels[:, POWERS], span)
+    each, of_wet = np.unique(np.column_stack([capacity, left, filled, rise])[capacity > 0], axis=0, return_inverse=True)
+    hollow = np.zeros(len(capacity), dtype=np.intp)
+    hollow[capacity > 0] = 1 + of_wet.ravel()
+    values: dict[str, NDArray[Any]] = {
+        nodes.BLUR: places.blur,
+        nodes.TRODDEN: places.trodden,
+        nodes.PRESSED: pressed,
+        nodes.MOMENT: np.where(since < NOT_YET, 1 + moment_of(since, span), 0),
+    }
+    if matter.snow_depth:
+        values[nodes.COMPACTED] = compacted
+    if matter.soaking:
+        values[nodes.HOLLOW], values[nodes.ABOVE] = hollow, above
+    if (again := places.again[:, 1] < NOT_YET).any():
+        values[nodes.AGAIN] = places.again[:, 0]
+        values[nodes.BEFORE] = np.where(again, 1 + moment_of(places.again[:, 1], span), 0)
+        values[nodes.BLUR_BEFORE] = places.blur_before
+    own_data.remove(mesh, set(nodes.OF_WEATHER) - set(values))
+    for name, of_vertices in values.items():
+        kind = nodes.OF_WEATHER[name]
+        stored = of_vertices.astype(np.int32 if kind == "INT" else np.float32)
+        field = "vector" if kind == "FLOAT_VECTOR" else "value"
+        own_data.attribute(mesh, name, kind).data.foreach_set(field, stored.ravel())
+    mesh.update()
+    pool, rise = np.split(np.vstack([np.zeros(6), each]), 2, axis=1)
+    return {"pool": pool, "rise": rise}
+
+
+def _values(mesh: bpy.types.Mesh, name: str) -> Array:
+    attribute: Any = mesh.attributes.get(name)
+    if attribute is None:
+        raise InputError("The bake has lost its playback modifier: bake again.")
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.float64)

@@ -1,0 +1,91 @@
+"""Weather by what it comes to: how long the shot lasts in its time, and how deep new snow lies at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from ...core.weather.weather import HOUR, Span, matter_of, span_of
+from ...core.weather.weather_course import Weather, course_of
+from .. import compat, settings
+from ..ground import baked_ground
+from ..playback import weather_modifier
+from ..playback.weather_course_nodes import FIRST
+from ..playback.weather_nodes import within
+from . import weather_keys
+
+NIGHT = 8.0
+"""How long a shot lasts at first [h]: any slider shows at once what it does."""
+MOST_SNOW, ROUNDS = 100.0, 40
+"""Most snowfall [cm/h], and how often the range in which it is sought is halved."""
+
+
+def modifier_of(scene: bpy.types.Scene) -> Any:
+    """The weather on a scene's ground; None where there is none."""
+    ground = scene.softground.ground
+    modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
+    return modifier if modifier and modifier.node_group and within(modifier.node_group) else None
+
+
+def hours(scene: bpy.types.Scene) -> float:
+    """How long the scene lasts in the time of its weather, whose scale is not keyed [h]."""
+    modifier = modifier_of(scene)
+    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(scene, modifier) / HOUR if modifier else 0.0
+
+
+def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
+    """Have the scene last so long [h]; as much snow lies at its end as before."""
+    if modifier := modifier_of(scene):
+        depth = snow_cm(scene)
+        _write(modifier, "Time Scale", wanted * HOUR / _seconds(scene, modifier))
+        set_snow_cm(scene, depth)
+
+
+def snow_cm(scene: bpy.types.Scene) -> float:
+    """Depth of the new snow on open ground at the end of the scene [cm]."""
+    modifier = modifier_of(scene)
+    return _cover_cm(scene, modifier)() if modifier else 0.0
+
+
+def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
+    """Let so much snow fall that it lies that deep at the end [cm], or the most that can fall."""
+    if modifier := modifier_of(scene):
+        cover = _cover_cm(scene, modifier)
+        least, most = 0.0, MOST_SNOW if wanted > 0 else 0.0
+        for _ in range(ROUNDS if most else 0):
+            middle = (least + most) / 2
+            least, most = (least, middle) if cover(middle) > wanted else (middle, most)
+        _write(modifier, "Snowfall", most)
+
+
+def _cover_cm(scene: bpy.types.Scene, modifier: Any) -> Callable[..., float]:
+    """Depth of new snow at the end [cm] as a function of the snowfall [cm/h], by default that of the slider."""
+    span, end = _span(scene, modifier)
+    rates, matter = weather_keys.rates(modifier, span), matter_of(scene.softground.material.surface, 0.0, 1.0)
+
+    def cover(snowfall: float | None = None) -> float:
+        falls = rates["snowfall"] if snowfall is None else snowfall * 0.01 / HOUR
+        course = course_of(Weather(**rates | {"snowfall": falls}), matter, frame=end, span=span)
+        return 100.0 * float(course.cover[0])
+
+    return cover
+
+
+def _span(scene: bpy.types.Scene, modifier: Any) -> tuple[Span, float]:
+    """The span of the weather, and the scene's last frame, both in the time that playback counts."""
+    tree, stretch = modifier.node_group, settings.time_stretch_of(scene)
+    first = within(tree).nodes[FIRST].outputs[0].default_value
+    end = float(max(scene.frame_end * stretch, first + 1.0))
+    return span_of(first, max(end, tree[weather_keys.LAST]), settings.frame_rate_of(scene) * stretch), end
+
+
+def _seconds(scene: bpy.types.Scene, modifier: Any) -> float:
+    span, end = _span(scene, modifier)
+    return (end - span.first) / span.frame_rate
+
+
+def _write(modifier: Any, name: str, value: float) -> None:
+    compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], value)
+    modifier.id_data.update_tag()

@@ -1,0 +1,103 @@
+"""The debris of a bake: computed from its loads and its record, and booked out of the rims."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..ground.soft_ground import SoftGround, Weathering
+from ..ground.sparse_grid import SparseGrid
+from ..loads.estimate import CharacterLoads
+from ..numerics.slices import Slices, sliced, without_warnings
+from ..record.footprints import recompose
+from ..record.record import BakeRecord
+from . import flight
+from .debris import Debris, Height, sources, throw, throws_of, volumes
+
+Array = NDArray[np.float64]
+
+
+@sliced
+def thrown(
+    left: BakeRecord,
+    ground: SoftGround,
+    *,
+    surface: str,
+    cell_size: float,
+    gravity: float,
+    loads: Sequence[CharacterLoads] | None = None,
+) -> Slices[tuple[BakeRecord, Debris | None]]:
+    """What the steps of a record throw as the artist leaves them, and the record with it booked; None if nothing may.
+
+    Parameters
+    ----------
+    left : BakeRecord
+    ground : SoftGround
+        Before anything pressed it.
+    surface : str
+    cell_size : float
+        [m]
+    gravity : float
+        [m/s²]
+    loads : sequence of CharacterLoads, optional
+        From which it follows how steps throw; by default it is what the record says of that.
+
+    Raises
+    ------
+    InputError
+        If what the record says is damaged.
+    """
+    if not (left.throws if loads is None else left.footprints):
+        return left, None
+    if loads is not None:
+        left = replace(left, throws=(yield from throws_of.slices(loads, left.footprints, surface=surface)))
+    try:
+        return (yield from without_warnings(_thrown(left, ground, surface, cell_size, gravity)))
+    except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
+        raise InputError(
+            f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
+        ) from None
+
+
+def _thrown(
+    left: BakeRecord, ground: SoftGround, surface: str, cell_size: float, gravity: float
+) -> Slices[tuple[BakeRecord, Debris]]:
+    left = replace(left, thrown={})
+    thrown_by = yield from sources.slices(left.throws, left.steps, surface=surface, gravity=gravity)
+    left = replace(left, thrown=volumes(thrown_by))
+    pressed = recompose(left.edited, cell_size=cell_size)
+    yield
+    bare = flight.SampledHeights(ground.terrain.heights, cell_size)  # thousands fall side by side
+
+    def height(x: Array, y: Array) -> Array:
+        compression, rim = pressed.sample(x, y)
+        return np.asarray(bare(x, y) + rim - compression)
+
+    in_weather = _in_weather(left, ground.weathering, height, cell_size)
+    pieces = throw.slices(thrown_by, surface=surface, gravity=gravity, height=height, height_at=in_weather)
+    return left, (yield from pieces)
+
+
+def _in_weather(
+    left: BakeRecord, weathering: Weathering | None, height: Height, cell_size: float
+) -> Callable[[float], Height] | None:
+    """Heights at scene frames, where steps feel weather: new snow raises open ground, and steps press it down."""
+    if weathering is None:
+        return None
+    trodden = SparseGrid(cell_size, channels=1)
+    for one in left.edited:
+        values = trodden.read(one.window)
+        values.reshape(-1)[one.contact_cells] = 1.0
+        trodden.write(one.window, values)
+
+    def height_at(frame: float) -> Height:
+        level = weathering.level(frame)
+        return lambda x, y: (
+            np.asarray(height(x, y) + (1.0 - trodden.sample(x, y)[0]) * level) if level else height(x, y)
+        )
+
+    return height_at

@@ -1,0 +1,139 @@
+"""Motions made fit for derivatives: stepped keys bridged, loops and gaits continued beyond their ends.
+
+Only the estimate of contacts and forces uses these; the ground is pressed by the motion as it is shown.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..motion.sole_motion import orthonormal
+from ..numerics.interpolation import cubic, in_stretches
+from ..numerics.intervals import runs
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SAME_POSE = 1e-5
+"""Poses that differ by less are the same, in leg lengths."""
+LONGEST_HOLD = 0.25
+"""A pose that stays longer is a rest and not a stepped key [s]: keys on threes at 12 frames a second."""
+LIKE_POSE = 0.05
+"""Poses are alike when joints and soles are this near on average, in leg lengths (5 cm for an adult)."""
+VELOCITY_WEIGHT = 0.3
+"""A difference of velocity counts as one of position after this time, in sqrt(leg length/gravity) (0.1 s)."""
+CONTINUATION = 1.0
+"""How far a motion is continued beyond each end, in the same unit (0.3 s)."""
+
+
+def without_holds(motion: CharacterMotion) -> CharacterMotion:
+    """The motion between stepped keys, where poses are held for a few frames each.
+
+    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated.
+    """
+    held = _held(motion)
+    if not held.any():
+        return motion
+    known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
+    return _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+
+
+def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
+    """A motion that goes on for a moment beyond both of its ends, where it has been in the same pose before.
+
+    After the last pose comes what followed the pose most like it, before the first one what preceded its like: exact
+    for loops, near for a few strides of a gait and for standing still. Where no pose is like it, the motion ends.
+
+    Returns
+    -------
+    motion : CharacterMotion
+    given : slice
+        Which of its frames are those of the given motion.
+    """
+    count = len(motion.frames)
+    margin = max(1, round(CONTINUATION * motion.pendulum_time / motion.time_step))
+    if count < 2 * margin:
+        return motion, slice(0, count)
+    before = _most_like(motion, 0, np.arange(margin, count))
+    after = _most_like(motion, count - 1, np.arange(count - margin))
+
+    def extended(samples: Array) -> Array:
+        pieces = [samples]
+        if before is not None:
+            pieces.insert(0, samples[before - margin : before] + _offset(samples, 0, before))
+        if after is not None:
+            pieces.append(samples[after + 1 : after + 1 + margin] + _offset(samples, count - 1, after))
+        return np.concatenate(pieces)
+
+    longer = _mapped(motion, extended)
+    first = 0 if before is None else margin
+    frame = motion.frames[1] - motion.frames[0]
+    total = len(next(iter(longer.soles)).transforms)
+    frames = motion.frames[0] + frame * (np.arange(total) - first)
+    return dataclasses.replace(longer, frames=frames), slice(first, first + count)
+
+
+def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) -> int | None:
+    """The one of `others` whose pose and velocity are most like those at an end of the motion, if any are alike."""
+    paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
+    count = len(motion.frames)
+
+    def points(frames: NDArray[np.intp]) -> Array:
+        places = np.stack([path[frames] for path in paths], axis=1)
+        return places - places.mean(axis=1, keepdims=True) * (1.0, 1.0, 0.0)
+
+    def velocity(frames: NDArray[np.intp]) -> Array:
+        # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
+        start = np.clip(frames - (frame > 0), 0, count - 2)
+        return (points(start + 1) - points(start)) / motion.time_step
+
+    here = np.array([frame])
+    weight = VELOCITY_WEIGHT * motion.pendulum_time
+
+    def distances(some: slice) -> Array:
+        frames = others[some]
+        moved = weight * (velocity(frames) - velocity(here))
+        return np.sqrt(((points(frames) - points(here)) ** 2 + moved**2).sum(axis=-1).mean(axis=-1))
+
+    distance = in_stretches(distances, len(others))
+    best = int(distance.argmin())
+    return int(others[best]) if distance[best] < LIKE_POSE * motion.leg_length else None
+
+
+def _offset(samples: Array, frame: int, other: int) -> Array:
+    """What is to be added to the samples near `other` so that they go on from `frame`; poses only move, not turn."""
+    offset = samples[frame] - samples[other]
+    if samples.ndim == 4:  # poses (F, P, 4, 4)
+        offset[..., :3, :3] = 0.0
+    return offset
+
+
+def _held(motion: CharacterMotion) -> Mask:
+    """Frames that repeat the pose of the frame before, in holds too short to be rests."""
+    held = np.ones(len(motion.frames), dtype=bool)
+    held[0] = False
+    for path in (*(sole.transforms for sole in motion.soles), *motion.joints.values()):
+        moved = np.abs(np.diff(path, axis=0)).reshape(len(path) - 1, -1).max(axis=1)
+        held[1:] &= moved < SAME_POSE * motion.leg_length
+    for first, last in zip(*runs(held), strict=True):
+        if (last - first + 1) * motion.time_step > LONGEST_HOLD or last == len(held):
+            held[first:last] = False
+    return held
+
+
+def _mapped(motion: CharacterMotion, change: Callable[[Array], Array]) -> CharacterMotion:
+    """The motion with every pose and joint path changed likewise."""
+    soles = tuple(
+        dataclasses.replace(
+            sole,
+            transforms=orthonormal(change(sole.transforms)),
+            bears=None if sole.bears is None else change(sole.bears.astype(float)) > 0.5,
+        )
+        for sole in motion.soles
+    )
+    return dataclasses.replace(motion, soles=soles, joints={name: change(path) for name, path in motion.joints.items()})

@@ -1,0 +1,60 @@
+"""What the scene's camera sees of a ground: how far the picture reaches, and where it comes close."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Place = tuple[float, float, float]
+
+PIXELS = 0.75
+"""Width of a fine cell in the picture from which it is worth its vertices [pixels]."""
+FARTHEST = 30.0
+"""How far a ground reaches beyond the walk where the camera sees far [m]."""
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """A camera as it was when a bake began.
+
+    Attributes
+    ----------
+    corners : tuple of (place, place)
+        Ray through each corner of the picture: where it begins [m], and its direction.
+    eyes : tuple of places
+        Where the camera is, now and along its path [m].
+    pixels_per_radian : float
+        Pixels of the picture over the angle that they are seen under, in its middle; 0 without perspective.
+    """
+
+    corners: tuple[tuple[Place, Place], ...]
+    eyes: tuple[Place, ...]
+    pixels_per_radian: float
+
+    def reach(self, height: float) -> Array:
+        """Where the corners of the picture lie on level ground, (N, 2) [m]; far away for those above the horizon.
+
+        Examples
+        --------
+        >>> CameraView((((0.0, 0.0, 2.0), (0.5, 0.0, -1.0)),), (), 0.0).reach(1.0)
+        array([[0.5, 0. ]])
+        """
+        origin, ray = np.array(self.corners).transpose(1, 0, 2)
+        down = ray[:, 2] < 0
+        far = 2 * FARTHEST / np.maximum(np.linalg.norm(ray[:, :2], axis=1), 1e-9)
+        along = np.where(down, (height - origin[:, 2]) / np.where(down, ray[:, 2], -1.0), far)
+        return np.asarray(origin[:, :2] + np.clip(along, 0.0, far)[:, None] * ray[:, :2])
+
+    def is_near(self, places: Array, spacing: float) -> Mask:
+        """Which of some places (N, 2) [m] are seen from so near that cells of a size [m] show."""
+        if not self.pixels_per_radian:
+            return np.ones(len(places), dtype=bool)
+        distance = spacing * self.pixels_per_radian / PIXELS
+        near = np.zeros(len(places), dtype=bool)
+        for eye in np.unique(self.eyes, axis=0):
+            near |= np.hypot(*(places - eye[:2]).T) < np.sqrt(max(distance**2 - eye[2] ** 2, 0.0))
+        return near

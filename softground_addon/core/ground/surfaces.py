@@ -1,0 +1,261 @@
+"""What grounds are made of: one record for each surface, with all that follows from what it is made of.
+
+A new look is a record here, a function of `blender.materials.surface_shaders` and a preset with its picture.
+
+References
+----------
+Clifton, Rüedi and Lehning 2006, "Snow saltation threshold measurements in a drifting-snow wind tunnel", Journal of
+Glaciology 52, doi:10.3189/172756506781828430: loose snow drifts from 0.27-0.69 m/s on, with its density.
+Bagnold 1941, "The physics of blown sand and desert dunes": sand of 0.25 mm moves from
+0.1·sqrt((rho_s - rho_a)/rho_a·g·d) on.
+Cook 2002, "Modeling Bill's Gait: analysis and parametric synthesis of walking sounds", AES 22nd conference.
+Fontana and Bresin 2003, "Physics-based sound synthesis and control: crushing, walking and running by crumpling sounds",
+14th Colloquium on Musical Informatics: Poisson processes of micro-impacts, whose energies follow a power law.
+Cook 1997, "Physically informed sonic modeling (PhISM): synthesis of percussive sounds", Computer Music Journal 21,
+doi:10.2307/3681012: how often particles collide. What his *crunch* of snow does is 7 in 1024 samples: 150 each second
+at 22 kHz, 300 at 44 kHz.
+Turchet, Serafin, Dimitrov and Nordahl 2010, "Physically based sound synthesis and control of footsteps sounds",
+13th Conference on Digital Audio Effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import InputError
+
+HOUR = 3600.0
+
+Range = tuple[float, float]
+Triple = tuple[float, float, float]
+
+DEFAULT = "soil"
+"""Surface of a preset that names none."""
+
+
+@dataclass(frozen=True)
+class ThrownMatter:
+    """Matter in the air.
+
+    Attributes
+    ----------
+    repose : float
+        Angle of repose: what pushes along the ground harder than that throws it [deg].
+    film : float
+        Thickness of what a sole sheds after it has left, over its area [m]: what stays on it is no debris. A sole keeps
+        what its yield stress holds against the swing: of mud 200 Pa/(1700 kg/m³·30 m/s²), 4 mm; of wet sand, with a
+        capillary cohesion of about 1 kPa, more than it carries. What hangs on loosely comes off: 5 to 15 g of a boot,
+        by eye.
+    lumps : int
+        In how many lumps it comes off, which break as they do; 0 where it trickles.
+    sizes, settling : (float, float)
+        Smallest and largest diameter [m] (see `crumbs`), and the speeds at which these fall at last [m/s].
+    most : int
+        Pieces of a step in one phase at most: what is more is drawn as larger ones.
+    fine : float
+        Share of the volume in as many single grains, as a mist between the pieces.
+    """
+
+    repose: float
+    film: float
+    lumps: int
+    sizes: Range
+    settling: Range
+    most: int = 4000
+    fine: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """The shapes of crumbs: broken crust, grains, clumps, drops, clods.
+
+    Attributes
+    ----------
+    largest : float
+        Diameter of the largest [m].
+    roughness, cuts : float, int
+        How far their surface is from a sphere, over their radius; number of flat sides, along which they broke.
+    stretch : tuple of (float, float, float)
+        Along three axes, of each shape.
+    angular : bool
+        True if they break along faces, as clods, which smooth shading makes pebbles of.
+    translucency : float
+        Share of light that they let through: they glow against the sun. Sand that lies turns dark by more of it.
+    """
+
+    largest: float
+    roughness: float
+    cuts: int = 0
+    stretch: tuple[Triple, ...] = ((1.0, 1.0, 0.85),) * 6
+    angular: bool = False
+    translucency: float = 0.0
+
+
+@dataclass(frozen=True)
+class Voice:
+    """The sound under a foot: what is excited, in which bands, and for how long.
+
+    Attributes
+    ----------
+    crackle, noise, thump, pop : float
+        Loudness of its parts: micro-impacts, grains that slide, the heel on packed ground, the foot that leaves mud.
+    crackle_band, noise_band, thump_pitch : (float, float)
+        Between which the resonances of micro-impacts, the noise of what slides and the thump of a heel lie [Hz].
+    crackle_decay : (float, float)
+        Between which the decay times of micro-impacts lie [s].
+    density, gamma : float
+        Micro-impacts for each litre that is compacted; their energies follow E^-gamma.
+    """
+
+    crackle: float
+    noise: float
+    thump: float
+    pop: float
+    crackle_band: Range
+    crackle_decay: Range
+    density: float
+    gamma: float
+    noise_band: Range
+    thump_pitch: Range
+
+
+@dataclass(frozen=True)
+class Soaking:
+    """How fast ground takes up water: at first and in the end [m/s], and how fast it goes from one to the other [1/s].
+
+    As Horton's f = final + (first - final)·exp(-decay·t). Water from below fills a print over a time `seep` [s].
+    """
+
+    first: float
+    final: float
+    decay: float
+    seep: float
+
+
+@dataclass(frozen=True)
+class SurfaceRecord:
+    """What a ground is made of.
+
+    Attributes
+    ----------
+    name : str
+        As presets and records name it.
+    density : float
+        Of the loose matter [kg/m³]; sand is quartz of 2,650 with 40 % of pores.
+    thrown, fragments, voice : ThrownMatter, Fragments, Voice
+    colour : (float, float, float)
+        Of its pieces, and of the ground in Solid shading.
+    shades, swell : (float, float), float
+        Brightness of the darkest and the lightest parts of open ground, and the height of its swells [m].
+    shader, relief : str
+        Names of its function in `blender.materials.surface_shaders` and of its table of amounts in presets/relief.
+    midi_note : int
+        Of the left foot; the right one's is the next, and the next that of all else.
+    soaking : Soaking or None
+        How it takes up rain: sand, loam and clay, dry; wet sand has had its first rain. None of snow, which takes up
+        what falls.
+    drifts_from : float or None
+        Friction velocity of the wind from which it moves [m/s]; None if it stays.
+    melts, wet, pales : bool
+        True of snow; of what is wet to begin with; of wet sand, which turns pale around a loaded foot.
+    control : str or None
+        Field of the panel that sets the stiffness by what people know: 'hand_hardness' of snow, 'moisture' of sand.
+    """
+
+    name: str
+    density: float
+    thrown: ThrownMatter
+    fragments: Fragments
+    voice: Voice
+    colour: Triple
+    shades: Range
+    swell: float
+    shader: str
+    relief: str
+    midi_note: int
+    soaking: Soaking | None = None
+    drifts_from: float | None = None
+    melts: bool = False
+    wet: bool = False
+    pales: bool = False
+    control: str | None = None
+
+    @property
+    def label(self) -> str:
+        """Name that the user sees."""
+        return self.name.replace("_", " ").title()
+
+
+SURFACES = {record.name: record for record in (
+    SurfaceRecord(
+        "snow",
+        density=150.0,
+        thrown=ThrownMatter(34.0, 1.0e-3, 0, (0.5e-3, 8.0e-3), (0.5, 3.0), 16_000, 0.1),
+        fragments=Fragments(
+            0.024, 0.14, 5,
+            ((1, 1, 0.65), (1, 0.8, 0.6), (1, 0.9, 0.75), (1, 1, 0.5), (1, 0.75, 0.7), (1, 0.9, 0.6)),
+            translucency=0.5,
+        ),
+        voice=Voice(1.0, 0.25, 0.3, 0.0, (1000, 4000), (0.0015, 0.004), 220.0, 1.5, (1500, 6000), (80, 150)),
+        colour=(0.87, 0.90, 0.94), shades=(0.92, 1.0), swell=0.50,
+        shader="snow", relief="snow", midi_note=36,
+        drifts_from=0.27, melts=True, control="hand_hardness",
+    ),
+    SurfaceRecord(
+        "sand",
+        density=1600.0,
+        thrown=ThrownMatter(34.0, 0.1e-3, 0, (0.3e-3, 2.0e-3), (2.0, 6.0), 16_000, 0.01),
+        fragments=Fragments(0.002, 0.15, 2, translucency=0.15),
+        voice=Voice(0.0, 1.0, 0.25, 0.0, (2000, 6000), (0.0005, 0.001), 0.0, 1.5, (1200, 7000), (60, 110)),
+        colour=(0.66, 0.48, 0.29), shades=(0.84, 1.10), swell=0.20,
+        shader="dry_sand", relief="sand", midi_note=40,
+        soaking=Soaking(127e-3 / HOUR, 10e-3 / HOUR, 4.0 / HOUR, 2.0), drifts_from=0.23, control="moisture",
+    ),
+    SurfaceRecord(
+        "wet_sand",
+        density=1800.0,
+        thrown=ThrownMatter(45.0, 0.4e-3, 8, (2.0e-3, 12.0e-3), (5.0, 9.0)),
+        fragments=Fragments(0.012, 0.2, 2),
+        voice=Voice(0.25, 0.7, 0.5, 0.15, (800, 3000), (0.001, 0.003), 200.0, 1.6, (600, 3500), (70, 120)),
+        colour=(0.24, 0.16, 0.09), shades=(0.74, 1.18), swell=0.14,
+        shader="wet_sand", relief="wet_sand", midi_note=44,
+        soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
+    ),
+    SurfaceRecord(
+        "mud",
+        density=1700.0,
+        thrown=ThrownMatter(15.0, 0.3e-3, 6, (2.0e-3, 20.0e-3), (5.0, 9.0)),
+        fragments=Fragments(  # comes down as flat clods, drops and strings
+            0.020, 0.1, 0,
+            ((1, 0.9, 0.35), (1, 0.7, 0.45), (1, 0.85, 0.25), (1, 0.8, 0.6), (1, 0.45, 0.3), (1, 0.25, 0.2)),
+        ),
+        voice=Voice(0.3, 0.6, 0.5, 0.8, (250, 900), (0.004, 0.012), 60.0, 1.8, (150, 1200), (60, 100)),
+        colour=(0.10, 0.065, 0.04), shades=(0.70, 1.25), swell=0.16,
+        shader="mud", relief="mud", midi_note=48,
+        soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True,
+    ),
+    SurfaceRecord(
+        "soil",
+        density=1300.0,
+        thrown=ThrownMatter(38.0, 0.3e-3, 0, (2.0e-3, 30.0e-3), (3.0, 12.0)),
+        fragments=Fragments(0.030, 0.2, 6, angular=True),
+        voice=Voice(0.9, 0.35, 0.45, 0.0, (500, 3000), (0.002, 0.007), 500.0, 1.3, (400, 2500), (70, 140)),
+        colour=(0.12, 0.07, 0.04), shades=(0.70, 1.25), swell=0.16,
+        shader="soil", relief="soil", midi_note=52,
+        soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0),
+    ),
+)}  # fmt: skip
+"""Surfaces by name, in the order in which the user sees them."""
+
+
+def find(name: object, origin: str = "Ground") -> SurfaceRecord:
+    """The surface of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none, naming `origin` and the surfaces that there are.
+    """
+    if isinstance(name, str) and name in SURFACES:
+        return SURFACES[name]
+    raise InputError(f"{origin}: 'surface' is {name!r}; it must be one of {', '.join(SURFACES)}.")

@@ -1,0 +1,1 @@
+"""Legs that put feet where they belong: placement on the ground, locks, knees."""

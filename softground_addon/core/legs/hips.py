@@ -1,0 +1,79 @@
+"""Hips that go with the feet: down with those that sink, along with those that are moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..numerics.plane_fit import smoothed
+from .foot_placement import Placement
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LOWER_FOOT = 0.02
+"""Least height by which one foot stands lower for the hips to follow it, in leg lengths."""
+
+HIPS_TIME = 0.10
+"""Standard deviation of the smoothing of the hips' height over time [s], for an adult."""
+
+LOAD_TIME = 0.05
+"""Standard deviation of the passing of weight from foot to foot [s], for an adult."""
+
+
+def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> Array:
+    """Height that the hips gain (F,) [m]: that of the standing soles on the whole, less the sinkage of the deeper.
+
+    Smooth over time: weight passes from foot to foot, and hips that would drop into every print anew bounce.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    placements : mapping of int to Placement
+        By sole.
+    touching : (F, S) bool array
+    """
+    if not placements:
+        return np.zeros(len(motion.frames))
+    stands = touching[:, list(placements)]
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
+    sinkage = np.stack([placement.sinkage for placement in placements.values()], axis=1)
+    unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
+    deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
+    width = HIPS_TIME * motion.adult_second
+    return mean_over_time(unsunk, load, width) - mean_over_time(sinkage, load * deeper, width)
+
+
+def hips_go_along(
+    motion: CharacterMotion, soles: Sequence[int], offsets: Sequence[Array], touching: Mask, width: float
+) -> Array:
+    """Movement of the hips (F, D) [m]: as the feet that stand, smoothly.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    soles : sequence of int
+    offsets : sequence of (F, D) float arrays
+        Movement of the foot on each [m].
+    touching : (F, S) bool array
+    width : float
+        Standard deviation of the smoothing [s], for an adult.
+    """
+    stands = touching[:, list(soles)]
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
+    of_feet = np.stack(list(offsets), axis=1)
+    width *= motion.adult_second
+    return np.stack([mean_over_time(of_feet[..., i], load, width) for i in range(of_feet.shape[-1])], axis=-1)
+
+
+def mean_over_time(values: Array, weights: Array, width: float) -> Array:
+    """Weighted mean (F,) of values (F, S) under a Gaussian over time, straight where nothing has weight for long."""
+    total = smoothed(weights.sum(axis=1), width)
+    known = np.flatnonzero(total > 1e-3 * max(float(total.max()), 1e-12))
+    if not len(known):
+        return np.zeros(len(values))
+    mean = smoothed((weights * values).sum(axis=1), width)[known] / total[known]
+    return smoothed(np.interp(np.arange(len(values)), known, mean), width / 2)

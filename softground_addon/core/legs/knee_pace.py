@@ -1,0 +1,340 @@
+"""Limit of the knees' speed: hips and swinging feet give way a little, smoothly, where a knee would turn too fast.
+
+A leg that is nearly straight turns its knee by tens of degrees for a centimetre of hip or foot. Where the response
+would ask that of it, the hips and the feet in the air share the least and smoothest correction that keeps the pace: a
+least-squares problem over time, solved by Gauss-Newton steps (Nocedal and Wright 2006, "Numerical Optimization",
+chapters 10 and 17: quadratic penalties that grow, with a line search; a step that helps one knee and harms another is
+taken again with both in view). Where no knee is too fast and every ankle is in reach, nothing is corrected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.banded import solve_banded
+from ..numerics.slices import Slices, sliced
+from .legs import Leg
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FRAME = 1 / 30
+"""The time that the pace of a knee refers to [s]."""
+KNEE_PACE = np.radians(13.0) / _FRAME
+"""Largest speed of a knee [rad/s], for an adult, or that of the source where it is larger."""
+SOURCE_WINDOW = 0.05
+"""Time around an instant in which the source's own pace counts [s], for an adult."""
+NEARLY_STRAIGHT = np.radians(8.0)
+"""Least flexion at which the turn of a knee over its span is computed [rad]: it has no bound at 0."""
+
+# A correction x(t), in leg lengths, costs cost·(T²·x'')² + MAGNITUDE·x² at each sample; the rest is weighed against it.
+SMOOTHING_TIME = 0.08
+"""T, the time over which a correction comes and goes [s], for an adult."""
+MAGNITUDE = 0.1
+HIPS_SMOOTHING_TIME = 0.2
+"""T of hips that follow feet, which pay (T³·x''')² + (x - wanted)² [s], for an adult: less than it shakes them."""
+FOOT_FREEDOM = 0.3
+"""The cost of a correction of a foot beside one of the hips."""
+LARGEST = 0.12
+"""Corrections beyond this cost far more, in leg lengths: rather a fast knee than a body that drops."""
+_TOO_LARGE = 30.0
+_UNDERGROUND = 1e3
+"""Weight of a foot that would come lower than the ground."""
+_HELD = 1e6
+"""Weight of a foot that stands."""
+TOO_FAST = 300.0
+"""Final weight of a knee that turns too far in `_FRAME` [rad]; the steps begin at a hundredth of it."""
+OUT_OF_REACH = 1e3
+"""Cost of an ankle out of reach over that of a knee that is too fast, per leg length and radian."""
+STEPS = 14
+FIRM = 1000.0
+"""Factor of the cost where no knee may turn faster than the fastest of the source."""
+FURTHER_STEPS = 24
+"""Additional steps for this."""
+_PARTS = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
+"""Parts of a step that are tried until one of them is better: nearly straight knees are far from linear."""
+
+
+@dataclass(frozen=True)
+class PacedLeg:
+    """One leg as the response would have it.
+
+    Attributes
+    ----------
+    source : Leg
+    hip, ankle : (F, 3) float arrays
+        Where they would go [m].
+    reach : (F,) float array
+        Largest distance of the ankle from the hip [m].
+    stands : (F,) bool array
+        When its foot is on the ground and cannot give way.
+    room : (F,) float array
+        Height of its foot above the ground [m].
+    """
+
+    source: Leg
+    hip: Array
+    ankle: Array
+    reach: Array
+    stands: Mask
+    room: Array
+
+
+@dataclass(frozen=True)
+class Relief:
+    """Corrections that keep the knees' pace.
+
+    Attributes
+    ----------
+    hips : (F, 3) float array
+        Movement of the hips [m].
+    feet : mapping of str to (F,) float array
+        Movement of each foot toward its hip, by side, 0 while it stands [m].
+    """
+
+    hips: Array
+    feet: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class _Hips:
+    """Freedom of the hips and the cost of its use.
+
+    Attributes
+    ----------
+    axes : (H, 3) float array
+        Directions in which they may move.
+    wanted : (F, H) float array
+        Their movement without constraints [m].
+    order : int
+        Order of the derivative of their movement that is to be small.
+    smoothing : float
+        Cost of this derivative, beside `magnitude`, that of the deviation: see `SMOOTHING_TIME`.
+    magnitude : float
+    """
+
+    axes: Array
+    wanted: Array
+    order: int
+    smoothing: float
+    magnitude: float
+
+
+@sliced
+def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Slices[Relief]:
+    """The least and smoothest correction with which no knee turns too fast.
+
+    Parameters
+    ----------
+    legs : mapping of str to PacedLeg
+        By side; at least one.
+    step : float
+        Time between samples [s].
+    time_scale : float
+        Duration of the motion over that of an adult.
+    leg_length : float [m]
+    """
+    up, count = np.array([[0.0, 0.0, 1.0]]), len(next(iter(legs.values())).stands)
+    hips = _Hips(up, np.zeros((count, 1)), 2, (SMOOTHING_TIME * time_scale / step) ** 2, MAGNITUDE)
+    paces = [_allowed_turn(leg, step, time_scale) for leg in legs.values()]
+    weights = np.geomspace(TOO_FAST / 100.0, TOO_FAST, STEPS)
+    return (yield from _relieved(legs, hips, paces, weights, step, time_scale, leg_length))
+
+
+@sliced
+def follow(
+    legs: Mapping[str, PacedLeg], wanted: Array, *, step: float, time_scale: float, leg_length: float
+) -> Slices[Relief]:
+    """Hips that follow feet with the least jerk, while every ankle that stands is in reach.
+
+    No knee turns faster than the fastest of the source. See `relieve`.
+
+    Parameters
+    ----------
+    wanted : (F, 3) float array
+        Movement of the hips that follows the feet [m].
+    """
+    smoothing = (HIPS_SMOOTHING_TIME * time_scale / step) ** 3
+    hips = _Hips(np.eye(3), wanted, 3, smoothing, 1.0)
+    fastest = max(float(np.abs(np.diff(leg.source.flexion)).max(initial=0.0)) for leg in legs.values())
+    paces = [np.full(len(wanted) - 1, fastest) for _ in legs]
+    weights = np.geomspace(TOO_FAST / 100.0, FIRM * TOO_FAST, STEPS + FURTHER_STEPS)
+    return (yield from _relieved(legs, hips, paces, weights, step, time_scale, leg_length))
+
+
+def _relieved(
+    legs: Mapping[str, PacedLeg],
+    hips: _Hips,
+    paces: Sequence[Array],
+    weights: Array,
+    step: float,
+    time_scale: float,
+    leg_length: float,
+) -> Generator[None, None, Relief]:
+    """See `relieve`; constraints of knees and legs get weights that grow."""
+    paced, axes = list(legs.values()), len(hips.axes)
+    bends = (SMOOTHING_TIME * time_scale / step) ** 2
+    per_frame = _FRAME * time_scale / step
+    change = np.concatenate([hips.wanted, np.zeros((len(hips.wanted), len(paced)))], axis=1)
+
+    def violated(change: Array, weight: float, ahead: Array | None = None) -> list[_Equations]:
+        equations = []
+        for number, (leg, pace) in enumerate(zip(paced, paces, strict=True), start=axes):
+            equations += _pace_and_reach(change, number, leg, hips, pace, leg_length, weight * per_frame**2, ahead)
+        return equations
+
+    def proper(change: Array) -> list[_Equations]:
+        return _small_and_smooth(change, paced, hips, bends, leg_length)
+
+    if hips.wanted.any():
+        change = change + _solution(proper(change), change)
+    if any(len(each.wanted) for each in violated(change, 1.0)):
+        for weight in weights:
+            yield
+            costs, asked = proper(change), violated(change, weight)
+            cost = _cost(asked + costs)
+
+            def is_better(change: Array, weight: float = weight, cost: float = cost) -> bool:
+                return _cost(violated(change, weight) + proper(change)) < cost
+
+            toward = _solution(asked + costs, change)
+            part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+            if not part:
+                toward = _solution(violated(change, weight, change + toward) + costs, change)
+                part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+            change = change + part * toward
+    feet = {side: change[:, number] for number, side in enumerate(legs, start=axes)}
+    return Relief(change[:, :axes] @ hips.axes, feet)
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Weighted linear equations of a step.
+
+    Attributes
+    ----------
+    unknowns : (T, R) int array
+        Unknowns of each equation, ascending.
+    gradient : (T, R) float array
+    wanted : (R,) float array
+        Remaining value of each.
+    weight : (R,) float array or float
+    """
+
+    unknowns: NDArray[np.intp]
+    gradient: Array
+    wanted: Array
+    weight: Array | float
+
+
+def _solution(equations: Sequence[_Equations], change: Array) -> Array:
+    """Least-squares step from a correction."""
+    count, width = change.shape
+    apart = max(int(each.unknowns[-1, 0] - each.unknowns[0, 0]) for each in equations if each.unknowns.size)
+    band, right = np.zeros((max(apart, 1) + 1, count * width)), np.zeros((count * width, 1))
+    for each in equations:
+        for i, column in enumerate(each.unknowns):
+            np.add.at(right[:, 0], column, each.weight * each.gradient[i] * each.wanted)
+            for j in range(i, len(each.unknowns)):
+                np.add.at(band, (each.unknowns[j] - column, column), each.weight * each.gradient[i] * each.gradient[j])
+    return solve_banded(band, right).reshape(change.shape)
+
+
+def _cost(equations: Sequence[_Equations]) -> float:
+    return float(sum(np.sum(each.weight * each.wanted**2) for each in equations))
+
+
+def _allowed_turn(leg: PacedLeg, step: float, time_scale: float) -> Array:
+    """Largest turn of a knee from each sample to the next, (F - 1,) [rad]."""
+    source = np.abs(np.diff(leg.source.flexion))
+    reach = max(1, round(SOURCE_WINDOW * time_scale / step))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(source, reach, mode="edge"), 2 * reach + 1).max(axis=1)
+    return np.maximum(KNEE_PACE * step / time_scale, around)
+
+
+def _pace_and_reach(
+    change: Array,
+    number: int,
+    leg: PacedLeg,
+    hips: _Hips,
+    pace: Array,
+    leg_length: float,
+    weight: float,
+    ahead: Array | None = None,
+) -> list[_Equations]:
+    """Constraints of a leg where its knee turns too fast or its ankle is out of reach: with a correction, or also with
+    another, `ahead`."""
+    count, width = change.shape
+    axis, span = _hip_to_ankle(change, number, leg, hips)
+    by_hips = (axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)) @ hips.axes.T
+    by = np.concatenate([by_hips, np.where(leg.stands, 0.0, -1.0)[:, None]], axis=1).T
+    unknowns = np.arange(count) * width + np.array([*range(len(hips.axes)), number])[:, None]
+    flexion, slope = leg.source.flexion_at(span, NEARLY_STRAIGHT)
+    turn = np.diff(flexion)
+    limit, is_far = np.clip(turn, -pace, pace), span > leg.reach
+    is_fast = np.abs(turn) > pace
+    if ahead is not None:
+        span_ahead = _hip_to_ankle(ahead, number, leg, hips)[1]
+        turn_ahead = np.diff(leg.source.flexion_at(span_ahead)[0])
+        limit = np.where(is_fast, limit, np.copysign(pace, turn_ahead))
+        is_fast, is_far = is_fast | (np.abs(turn_ahead) > pace), is_far | (span_ahead > leg.reach)
+    fast, far = np.flatnonzero(is_fast), np.flatnonzero(is_far)
+    then = fast + 1
+    return [
+        _Equations(
+            np.concatenate([unknowns[:, fast], unknowns[:, then]]),
+            np.concatenate([-slope[fast] * by[:, fast], slope[then] * by[:, then]]),
+            (limit - turn)[fast],
+            weight,
+        ),
+        _Equations(
+            unknowns[:, far],
+            by[:, far] / leg_length,
+            (leg.reach[far] - span[far]) / leg_length,
+            OUT_OF_REACH * weight,
+        ),
+    ]
+
+
+def _hip_to_ankle(change: Array, number: int, leg: PacedLeg, hips: _Hips) -> tuple[Array, Array]:
+    """Vectors from the ankle to the hip (F, 3), and their lengths less the movement of the foot (F,) [m]."""
+    axis = leg.hip + change[:, : len(hips.axes)] @ hips.axes - leg.ankle
+    return axis, np.linalg.norm(axis, axis=1) - change[:, number]
+
+
+def _small_and_smooth(
+    change: Array, legs: Sequence[PacedLeg], hips: _Hips, bends: float, leg_length: float
+) -> list[_Equations]:
+    """Equations that keep corrections small and smooth, and zero for feet that stand or would be underground."""
+    count, width = change.shape
+    axes, terms = len(hips.axes), []
+    for number in range(width):
+        at = np.arange(count) * width + number
+        if number < axes:
+            size, cost = (change[:, number] - hips.wanted[:, number]) / leg_length, 1.0
+            order, smoothing, magnitude = hips.order, hips.smoothing, hips.magnitude
+        else:
+            size, cost = change[:, number] / leg_length, FOOT_FREEDOM
+            order, smoothing, magnitude = 2, bends, MAGNITUDE
+        stencil = smoothing * np.diff(np.eye(order + 1), order, axis=0).T * np.ones(max(count - order, 0))
+        rough = smoothing * np.diff(change[:, number] / leg_length, order)
+        samples = np.stack([at[i : max(count - order, 0) + i] for i in range(order + 1)])
+        terms.append(_Equations(samples, stencil / leg_length, -rough, cost))
+        terms.append(_pulled(at, -size, magnitude * cost, leg_length))
+        beyond = np.abs(size) > LARGEST
+        terms.append(_pulled(at[beyond], np.sign(size[beyond]) * LARGEST - size[beyond], _TOO_LARGE, leg_length))
+        if number >= axes:
+            leg = legs[number - axes]
+            terms.append(_pulled(at[leg.stands], -size[leg.stands], _HELD, leg_length))
+            low = ~leg.stands & (change[:, number] < -leg.room)
+            terms.append(_pulled(at[low], -leg.room[low] / leg_length - size[low], _UNDERGROUND, leg_length))
+    return terms
+
+
+def _pulled(unknowns: NDArray[np.intp], wanted: Array, weight: float, leg_length: float) -> _Equations:
+    """Single corrections that should change by so many leg lengths."""
+    return _Equations(unknowns[None], np.full((1, len(unknowns)), 1.0 / leg_length), wanted, weight)

@@ -1,0 +1,103 @@
+"""Jobs compute in slices, so that Blender answers between them."""
+
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import created_ground
+from softground_addon.blender.jobs import Progress, meanwhile, run
+from softground_addon.core.composers.ground_plan import GroundPlan
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.numerics.slices import sliced
+from tests.blender.shots import walker
+from tests.tiers import slow_but_one
+
+LONGEST_STEP = 0.1
+"""Longest time that a step of a bake may take of the processor [s]."""
+
+NOW = Progress("write", 0.5)
+
+
+@sliced
+def halved(number):
+    while number > 1:
+        yield
+        number /= 2
+    return number
+
+
+def test_a_job_comes_back_before_each_slice_and_ends_with_the_result():
+    assert list(meanwhile(NOW, halved.slices(8))) == [NOW] * 4
+    assert run(meanwhile(NOW, halved.slices(8))) == halved(8) == 1
+
+
+def test_whoever_waits_is_shown_each_progress_once():
+    def job():
+        yield Progress("sample", 1.0)
+        return (yield from meanwhile(NOW, halved.slices(8)))
+
+    shown = []
+    run(job(), shown.append)
+    assert shown == [Progress("sample", 1.0), NOW]
+
+
+def test_what_goes_wrong_in_a_slice_is_told():
+    @sliced
+    def failing():
+        yield
+        return 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        run(meanwhile(NOW, failing.slices()))
+    with pytest.raises(ZeroDivisionError):
+        failing()
+
+
+def steps_of(job):
+    """What each step of a job takes of the processor [s], the longest first, each with how far it came."""
+    steps, progress, began = [], None, time.thread_time()
+    for progress in job:
+        steps.append((time.thread_time() - began, progress))
+        began = time.thread_time()
+    return sorted([*steps, (time.thread_time() - began, progress)], key=lambda step: -step[0])
+
+
+def share_of_longest(steps):
+    """The part of all of their time that the longest of some steps takes."""
+    return steps[0][0] / sum(seconds for seconds, _ in steps)
+
+
+def test_a_large_ground_is_laid_out_in_short_steps():
+    along = np.linspace(0.0, 15.0, 1500)
+    plan = GroundPlan(np.full(2, -5.0), np.full(2, 20.0), FlatTerrain(), np.stack([along, along], axis=-1), 0.01)
+    close_up = created_ground.CloseUp(0.0025, np.ones(len(along), dtype=bool), 10**7)
+    steps = steps_of(created_ground.lay_out.slices(plan, 0.01, 1.0, reach=0.1, close_up=close_up))
+    assert share_of_longest(steps) < 0.3, steps[:5]
+
+
+def create_plane():
+    bpy.ops.mesh.primitive_plane_add(size=40.0)
+
+
+def create_grid():
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=250, size=1.0, location=(9.0, 0.0, 0.0))
+    bpy.context.object.scale = (24.0, 4.0, 1.0)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("create", slow_but_one([None, create_plane, create_grid]))
+def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
+    walker(scene, frames=250, coarseness=1.0)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    if create:
+        create()
+        options.ground = bpy.context.object
+        options.tilt.use = options.grounding.use = True
+        bpy.context.view_layer.update()
+    steps = steps_of(bake_job.bake(scene))
+    assert options.frame_end == 250
+    assert steps[0][0] < LONGEST_STEP, steps[:5]

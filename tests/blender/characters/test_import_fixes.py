@@ -1,0 +1,126 @@
+"""Characters of files in other units, and the button that puts them right."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.characters.import_fixes import size_of
+from softground_addon.blender.compat import action_curves
+from softground_addon.core.motion.units import scale_to_metres
+from tests.blender import shots
+from tests.blender.baking.test_self_check import codes
+from tests.blender.grounds import bake
+from tests.tiers import slow_but_one
+
+
+def keys_of(armature):
+    return [tuple(key.co) for curve in action_curves(armature.animation_data.action) for key in curve.keyframe_points]
+
+
+def imported(scene, factor, *, loose=False):
+    """A walker as a file in other units has it: bones, mesh and keys of the root, without a scale of its own."""
+    armature = shots.walker(scene, frames=40)
+    figure = armature.children[0]
+    if loose:
+        figure.parent = None
+    armature.data.transform(np.diag([factor, factor, factor, 1.0]).tolist())
+    figure.data.transform(np.diag([factor, factor, factor, 1.0]).tolist())
+    for curve in action_curves(armature.animation_data.action):
+        if curve.data_path.endswith("location"):
+            for key in curve.keyframe_points:
+                key.co.y *= factor
+            curve.update()
+    bpy.context.view_layer.update()
+    return armature
+
+
+@pytest.fixture
+def metres(scene):
+    armature = shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    steps = bake(scene).report["steps"]
+    bpy.ops.softground.clear_bake()
+    mass = scene.softground.characters[0].mass
+    scene.softground.characters.clear()
+    bpy.data.objects.remove(armature.children[0])
+    bpy.data.objects.remove(armature)
+    return steps, mass
+
+
+@pytest.mark.parametrize("loose", slow_but_one([False, True]))
+@pytest.mark.parametrize("factor", slow_but_one([100.0, 0.01]))
+def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres, factor, loose):
+    steps, mass = metres
+    armature = imported(scene, factor, loose=loose)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    character = scene.softground.characters[0]
+    assert scale_to_metres(character.size) == pytest.approx(1 / factor)
+    keys = keys_of(armature)
+    bpy.ops.softground.fix_scale()
+    bpy.context.view_layer.update()
+    assert armature.parent.name == "Walker Scale"
+    assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
+    assert keys == keys_of(armature)
+    assert size_of(scene, armature) == pytest.approx(character.size, rel=1e-4)
+    assert 1.0 < character.size < 2.0
+    assert character.mass == pytest.approx(mass, rel=0.05)
+    scene.softground.cell_size = 0.02
+    report = bake(scene).report
+    assert not codes(report) & {"unit_scale", "mass_of_size"}
+    assert len(report["steps"]) == len(steps)
+    for one, other in zip(report["steps"], steps, strict=True):
+        assert one["position"] == pytest.approx(other["position"], abs=0.02)
+        assert one["max_depth_m"] == pytest.approx(other["max_depth_m"], rel=0.1)
+    with pytest.raises(RuntimeError, match="its scale needs no fix"):
+        bpy.ops.softground.fix_scale()
+    bpy.data.objects.remove(armature.parent)
+
+
+@pytest.mark.slow
+def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
+    armature = shots.walker(scene, frames=72)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    steps = bake(scene).report["steps"]
+    bpy.ops.softground.clear_bake()
+    with pytest.raises(RuntimeError, match="'Walker' does not walk on the spot"):
+        bpy.ops.softground.walk_ahead()
+    belt = bpy.data.objects.new("Belt", None)
+    scene.collection.objects.link(belt)
+    same_side = [step for step in steps if step["contact"] == steps[1]["contact"]]
+    first, last = same_side[0], same_side[-1]
+    frames = last["frame_start"] - first["frame_start"]
+    speed = np.subtract(last["position"], first["position"]) / frames  # of the whole walk, per frame
+    for frame in (1, 72):
+        belt.location = -speed * (frame - 1)
+        belt.keyframe_insert("location", frame=frame)
+    for curve in action_curves(belt.animation_data.action):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    armature.parent = belt
+    bpy.context.view_layer.update()
+    assert "walks_in_place" in codes(bake(scene).report)
+    bpy.ops.softground.clear_bake()
+    bpy.ops.softground.walk_ahead()
+    report = bake(scene).report
+    assert "walks_in_place" not in codes(report)
+    assert len(report["steps"]) == len(steps)
+    for one, other in zip(report["steps"], steps, strict=True):
+        assert one["position"][:2] == pytest.approx(other["position"][:2], abs=0.12)
+    assert belt.parent.name == "Walker Travel"
+
+
+@pytest.mark.parametrize("scale", slow_but_one([12.5, 39.4, 100.0, 0.0254, 0.01]))
+def test_the_button_works_that_a_warning_names_of_a_rig_that_was_scaled_after_it_was_added(scene, scale):
+    armature = shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    armature.scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    scene.softground.cell_size = 0.02 * scale
+    (finding,) = (one for one in bake(scene).report["self_check"] if one["code"] == "unit_scale")
+    bpy.ops.softground.fix_scale()
+    factor = armature.parent.scale.x
+    assert finding["remedy"].startswith(f"Press Scale by {factor:g}, or leave it")
+    assert factor * scale == pytest.approx(1.0, rel=0.02)

@@ -1,0 +1,163 @@
+"""What is not at work in a scene is said by name and with a remedy; scenes that are in order are silent."""
+
+import bpy
+import pytest
+
+from softground_addon.blender.compat import HAS_SLOTS, set_slot, slot_of
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.core.errors import InputError
+from tests.blender.grounds import bake, plane
+
+
+def finding(scene, code):
+    """The one finding of a bake; it is also in the report's and the panel's warnings."""
+    report = bake(scene).report
+    (found,) = report["self_check"]
+    assert found["code"] == code
+    shown = ground_mesh.warnings_of(baked_ground.display_mesh_of(scene.softground.ground))
+    assert list(shown) == report["warnings"]
+    return found
+
+
+def rig_of(scene):
+    return scene.softground.characters[0].armature
+
+
+@pytest.mark.parametrize("direction", [(0, -9.81, 0), (0, 0, 9.81), (1.0, 0, -9.7)])
+def test_gravity_that_points_elsewhere_is_said(short_walk, direction):
+    short_walk.gravity = direction
+    assert "Gravity of scene 'Scene' points along" in finding(short_walk, "gravity_direction")["message"]
+
+
+def test_gravity_that_is_switched_off_or_weak_points_nowhere_else(short_walk):
+    short_walk.gravity = (0, 0, -1.6)
+    assert not bake(short_walk).report["self_check"]
+    short_walk.gravity, short_walk.use_gravity = (3, 0, 0), False
+    assert not bake(short_walk).report["self_check"]
+
+
+@pytest.mark.parametrize(("away", "said"), [(4e3, False), (548e3, True)])
+def test_a_walk_so_far_from_the_origin_that_cells_are_rounded_away_is_said(short_walk, away, said):
+    short_walk.softground.cell_size = 0.02
+    rig_of(short_walk).location.x = away
+    ground = plane(short_walk)
+    ground.location.x = away
+    bpy.context.view_layer.update()
+    codes = {one["code"]: one["message"] for one in bake(short_walk, ground=ground).report["self_check"]}
+    assert ("far_from_origin" in codes) == said
+    if said:
+        assert "548 km from the world's origin, where Blender rounds positions to 6.2 cm" in codes["far_from_origin"]
+
+
+def test_a_place_on_a_map_is_no_broken_key(short_walk):
+    rig_of(short_walk).location = (548_000, 5_932_000, 0)
+    with pytest.raises(
+        InputError, match=r"is 5,932 km from the world's origin.*rounds positions to 50 cm: move it and"
+    ):
+        bake(short_walk)
+
+
+def strips(rig, *, at):
+    """The rig's action as strips of 30 frames, and nothing else."""
+    animation, action, slot = rig.animation_data, rig.animation_data.action, slot_of(rig.animation_data)
+    animation.action = None
+    track = animation.nla_tracks.new()
+    made = [track.strips.new(f"part {number}", start, action) for number, start in enumerate(at)]
+    for strip in made:
+        set_slot(strip, slot)
+    return made
+
+
+@pytest.mark.skipif(not HAS_SLOTS, reason="actions have slots from 4.4 on")
+@pytest.mark.parametrize("spoilt", ["slot", "muted", "elsewhere"])
+def test_a_strip_without_a_slot_is_named_where_it_plays(short_walk, spoilt):
+    _, second = strips(rig_of(short_walk), at=(1, 31))
+    short_walk.softground.frame_end = 30 if spoilt == "elsewhere" else 60
+    second.action_slot = None
+    second.mute = spoilt == "muted"
+    findings = bake(short_walk).report["self_check"]
+    said = [one["message"] for one in findings if one["code"] == "no_slot"]
+    assert bool(said) == (spoilt == "slot")
+    if said:
+        assert said[0].startswith("NLA strip 'part 1' of 'Walker' has no slot: nothing moves by it in frames 31-60")
+
+
+@pytest.mark.skipif(not HAS_SLOTS, reason="actions have slots from 4.4 on")
+def test_an_action_of_a_parent_without_a_slot_is_named(short_walk):
+    cart = bpy.data.objects.new("Cart", None)
+    short_walk.collection.objects.link(cart)
+    cart.keyframe_insert("location", frame=1)
+    rig_of(short_walk).parent = cart
+    assert not bake(short_walk).report["self_check"]
+    cart.animation_data.action_slot = None
+    assert "' of 'Cart' has no slot" in finding(short_walk, "no_slot")["message"]
+
+
+def drive(scene, expression):
+    """A parent of the rig of which a driver sets the height."""
+    cart = bpy.data.objects.new("Cart", None)
+    scene.collection.objects.link(cart)
+    rig_of(scene).parent = cart
+    cart.driver_add("location", 2).driver.expression = expression
+
+
+def test_a_driver_that_auto_run_holds_back_is_named_with_the_setting(short_walk):
+    drive(short_walk, "0.0 * frame + len([])")
+    assert not bake(short_walk).report["self_check"]
+    bpy.data.objects["Cart"].animation_data.drivers[0].driver.expression = "0 * len(bpy.data.objects)"
+    bpy.context.view_layer.update()
+    message = finding(short_walk, "idle_drivers")["message"]
+    assert message.startswith("1 driver of 'Cart' does not run (on 'location'), as Auto Run Python Scripts is off")
+
+
+def test_a_driver_that_hides_something_moves_nothing(short_walk):
+    drive(short_walk, "0.0 * frame")
+    bpy.data.objects["Cart"].driver_add("hide_render").driver.expression = "bpy.data.filepath"
+    bpy.context.view_layer.update()
+    assert not bake(short_walk).report["self_check"]
+
+
+def keyed_shape(obj):
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Smile")
+    for frame in (1, 20):
+        key.value = frame / 20
+        key.keyframe_insert("value", frame=frame)
+
+
+def keyed_wave(obj):
+    obj.modifiers.new("Ripple", "WAVE")
+
+
+@pytest.mark.parametrize(("change", "by"), [(keyed_shape, "its shape keys"), (keyed_wave, "its modifier 'Ripple'")])
+def test_a_prop_that_changes_its_shape_says_so_when_it_is_added_and_baked(scene, capfd, change, by):
+    bpy.ops.mesh.primitive_cube_add(size=0.4, location=(0, 0, 0.2))
+    change(bpy.context.active_object)
+    bpy.ops.softground.add_character()
+    said = capfd.readouterr().out
+    assert f"'Cube' changes its shape by {by}, but prints as a rigid body" in said
+    assert "does not move" not in said
+    scene.softground.cell_size, scene.softground.frame_start, scene.softground.frame_end = 0.02, 1, 20
+    messages = [one["message"] for one in bake(scene).report["self_check"] if one["code"] == "changing_shape"]
+    assert len(messages) == 1
+    assert by in messages[0]
+
+
+def test_a_frame_handler_that_moves_the_rig_is_named_and_another_is_not(short_walk):
+    rig = rig_of(short_walk)
+
+    def counts(scene):
+        rig.id_data["frame"] = scene.frame_current
+
+    def lifts(scene):
+        rig.location.x = 0.001 * scene.frame_current
+
+    for handler, said in ((counts, []), (lifts, ["frame_handler"])):
+        bpy.app.handlers.frame_change_post.append(handler)
+        try:
+            report = bake(short_walk).report
+        finally:
+            bpy.app.handlers.frame_change_post.remove(handler)
+        assert [one["code"] for one in report["self_check"]] == said
+        assert all(f"a frame handler of '{__name__}'" in one["message"] for one in report["self_check"])
+        bpy.ops.softground.clear_bake()

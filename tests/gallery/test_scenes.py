@@ -1,0 +1,57 @@
+"""Every scene of the gallery keeps what its picture promises, and is published with its command."""
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from gallery.make_all import HEROES
+from gallery.publish import LARGEST, PAGES, publish
+from sample_scenes.make_all import SCENES
+from tests.scenes import promises
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["relief", *HEROES])
+def test_the_scene_keeps_what_its_picture_promises(addon, scene, name):
+    module = import_module(f"gallery.{name}")
+    promises.keeps_its_claims(module, scene, module.CELL_SIZE)
+
+
+@pytest.mark.slow
+def test_volumes_are_kept_with_relief_and_every_option_on(addon, scene):
+    promises.keeps_the_invariants(import_module("gallery.relief"), scene)
+
+
+def test_every_scene_is_shown_with_its_command():
+    shown = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
+    modules = [f"sample_scenes.{name}" for name in SCENES] + [f"gallery.{name}" for name in ("relief", *HEROES)]
+    assert [module for module in modules if f"python -m {module}" not in shown] == []
+
+
+def test_pictures_of_the_docs_and_small_scenes_are_published(tmp_path):
+    built, project = tmp_path / "built", tmp_path / "project"
+    for folder in (built, project / "docs" / "images", project / "sample_scenes"):
+        folder.mkdir(parents=True)
+    for page in PAGES:
+        (project / "docs" / page).write_text("")
+    (project / "docs" / "gallery.md").write_text("![One](images/craters.jpg) ![Two](images/not_built.png)")
+    (project / "docs" / "figures.md").write_text("![Three](images/bicycle.jpg)")
+    for name, size in {
+        "craters.jpg": 5,
+        "bicycle.jpg": 5,
+        "other.jpg": 5,
+        "craters.blend": LARGEST,
+        "stunts.blend": LARGEST + 1,
+    }.items():
+        (built / name).write_bytes(bytes(size))
+    publish(built, project)
+    published = {path.name for path in project.rglob("*") if path.suffix in (".jpg", ".blend")}
+    assert published == {"craters.jpg", "bicycle.jpg", "craters.blend"}
+
+
+def test_scenes_in_the_repository_are_small():
+    for blend in (ROOT / "sample_scenes").glob("*.blend"):
+        assert blend.stat().st_size <= LARGEST, blend.name
