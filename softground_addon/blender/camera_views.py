@@ -15,7 +15,7 @@ LOOKS = 33
 
 
 def camera_view(scene: bpy.types.Scene, frames: tuple[int, int]) -> CameraView | None:
-    """What the scene's camera sees, now and on its path between two frames; None without one.
+    """View of the scene's camera, now and on its path between two frames; None without one.
 
     A camera that is keyed by its location is looked for along its path; one that follows something, where it is.
     """
@@ -40,11 +40,13 @@ def camera_view(scene: bpy.types.Scene, frames: tuple[int, int]) -> CameraView |
 
 
 def _path(camera: bpy.types.Object, frames: tuple[int, int]) -> Any:
-    """Where a camera is at some frames, (N, 3) in Blender units; nothing of one that has no path of its own."""
+    """Path of a camera over frames, (N, 3) in Blender units; nothing of one that has no path of its own."""
     keys = camera.animation_data
     if camera.parent is not None or keys is None or keys.action is None:
         return ()
     path = np.tile(np.array(camera.location, dtype=np.float64), (LOOKS, 1))
-    for curve in (cast("Any", one) for one in action_curves(keys.action, slot_of(keys)) if one.data_path == "location"):
+    for curve in (
+        cast("Any", channel) for channel in action_curves(keys.action, slot_of(keys)) if channel.data_path == "location"
+    ):
         path[:, curve.array_index] = [curve.evaluate(frame) for frame in np.linspace(*frames, LOOKS)]
     return path

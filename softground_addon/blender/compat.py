@@ -75,7 +75,7 @@ def node_inputs(modifier: Any) -> list[tuple[str, Any]]:
     names = [socket.identifier for socket in sockets if socket.in_out == "INPUT"]
     if hasattr(modifier, "properties"):
         held = [(name, getattr(modifier.properties.inputs, name, None)) for name in names]
-        return [(name, one.value) for name, one in held if hasattr(one, "value")]
+        return [(name, holder.value) for name, holder in held if hasattr(holder, "value")]
     return [(name, modifier[name]) for name in names if name in modifier.keys()]  # noqa: SIM118  (no mapping)
 
 

@@ -1,4 +1,4 @@
-"""What Blender tells the add-on. Each handler returns at once unless something is armed."""
+"""Handlers of Blender's events. Each returns at once unless something is armed."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def after_undo(*_: Any) -> None:
 
 @persistent
 def before_load(*_: Any) -> None:
-    """What goes on ends with the file."""
+    """End with the file whatever goes on."""
     modal_bake.stop()
     try:
         live.discard()

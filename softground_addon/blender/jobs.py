@@ -18,7 +18,7 @@ STAGES = {"sample": 6, "simulate": 3, "write": 1}
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a bake is.
+    """Progress of a bake.
 
     Attributes
     ----------

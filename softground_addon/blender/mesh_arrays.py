@@ -75,11 +75,11 @@ def triangle_corners(mesh: bpy.types.Mesh) -> tuple[Indices, Indices]:
 
 
 def _has_outer_diagonal(*corners: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Whether the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
+    """Return whether the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
     first, diagonal, last = (corner - corners[0] for corner in corners[1:])
 
-    def dot(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.einsum("ni,ni->n", one, other)
+    def dot(a: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.einsum("ni,ni->n", a, other)
 
     # (first x diagonal) . (last x diagonal), by Lagrange's identity.
     return dot(first, last) * dot(diagonal, diagonal) > dot(first, diagonal) * dot(last, diagonal)

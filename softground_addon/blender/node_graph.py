@@ -93,7 +93,7 @@ class NodeGraph:
             self._links.add((source, socket))
 
     def _once(self, *key: Hashable, make: Callable[[], Any]) -> Any:
-        """What was made for the same before, as the nodes of a file take more of it than thousands of vertices."""
+        """Nodes made for the same before, as the nodes of a file take more of it than thousands of vertices."""
         if key not in self._made:
             self._made[key] = make()
         return self._made[key]
@@ -156,7 +156,7 @@ class NodeGraph:
         return geometry
 
     def math(self, operation: str, first: Any, second: Any = 0.0, *, clamped: bool = False) -> Any:
-        """What an operation gives, kept between 0 and 1 if it is clamped."""
+        """Result of an operation, between 0 and 1 if it is clamped."""
 
         def make() -> Any:
             node = self.node("ShaderNodeMath", operation=operation, use_clamp=clamped)
@@ -227,7 +227,7 @@ class NodeGraph:
         return node.outputs[0]
 
     def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
-        """What a field is at one of a geometry's points, or at the last of them."""
+        """Value of a field at one of a geometry's points, or at the last of them."""
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT", clamp=True)
         self.link(geometry, node.inputs["Geometry"])
         self.link(value, node.inputs["Value"])
@@ -285,7 +285,7 @@ class NodeGraph:
 
 
 def _is(value: Any, other: Any) -> bool:
-    """Whether a socket's value is another one, as Blender rounds numbers."""
+    """Return whether a socket's value is another one, as Blender rounds numbers."""
     if isinstance(other, bool | int | float) or (isinstance(other, tuple | list) and value is not None):
         return np.array_equal(np.asarray(value, np.float32), np.asarray(other, np.float32))
     return bool(value == other)
@@ -314,7 +314,9 @@ class Number:
 
     def __array_ufunc__(self, function: np.ufunc, _method: str, *operands: Number | float) -> Number:
         """Numpy's functions as nodes, so that what is a law for arrays is one for these."""
-        return _FUNCTIONS[function](*(one if isinstance(one, Number) else self.graph.number(one) for one in operands))
+        return _FUNCTIONS[function](
+            *(operand if isinstance(operand, Number) else self.graph.number(operand) for operand in operands)
+        )
 
     def __rsub__(self, other: float) -> Number:
         return Number(self.graph, self.graph.math("SUBTRACT", other, self.socket))

@@ -18,7 +18,10 @@ def new_group(name: str, mark: str) -> Any:
 
 def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:
     """The first modifier whose node group is of a kind, whatever the names of both have become; None without one."""
-    return next((one for one in obj.modifiers if (group := getattr(one, "node_group", None)) and is_it(group)), None)
+    return next(
+        (modifier for modifier in obj.modifiers if (group := getattr(modifier, "node_group", None)) and is_it(group)),
+        None,
+    )
 
 
 def inputs_of(modifier: Any) -> dict[str, str]:

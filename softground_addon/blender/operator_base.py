@@ -1,4 +1,4 @@
-"""What operators have in common: when they can be used, and what becomes of their errors."""
+"""Base of operators: when they can be used, and what becomes of their errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class OnShot:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is any character in the scene."""
+        """Return whether there is any character in the scene."""
         cast("Any", cls).poll_message_set("Add a character first")
         return bool(character_setup.characters_of(settings.options_of(context)))
 
@@ -46,7 +46,7 @@ class OnBake:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is a bake on the scene's ground."""
+        """Return whether there is a bake on the scene's ground."""
         ground = settings.options_of(context).ground
         cast("Any", cls).poll_message_set("Bake the footprints first")
         return ground is not None and baked_ground.is_baked(ground)

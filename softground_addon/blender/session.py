@@ -1,4 +1,4 @@
-"""What goes on at the moment: `window_manager.softground`. Never saved with a file and no part of undo."""
+"""State of the moment: `window_manager.softground`. Never saved with a file and no part of undo."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def show_preview(is_shown: bool) -> None:
 
 
 def is_previewing() -> bool:
-    """Whether the ground shows for a moment what it does not hold, as while a step is dragged."""
+    """Return whether the ground shows for a moment what it does not hold, as while a step is dragged."""
     return state.is_previewing
 
 
@@ -101,7 +101,7 @@ def chosen_steps() -> tuple[str, ...]:
 
 
 def is_rendering() -> bool:
-    """Whether Blender renders beside what its user does."""
+    """Return whether Blender renders beside what its user does."""
     return bool(bpy.app.is_job_running("RENDER"))
 
 

@@ -13,7 +13,7 @@ _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\
 
 
 def check_stored(group: Any) -> None:
-    """Whether all values of a group of settings are such as its fields take: those of a forged file may be any.
+    """Return whether all values of a group of settings are such as its fields take: those of a forged file may be any.
 
     Raises
     ------
@@ -25,8 +25,8 @@ def check_stored(group: Any) -> None:
             continue
         value = getattr(group, field.identifier)
         if field.type == "COLLECTION":
-            for one in value:
-                check_stored(one)
+            for item in value:
+                check_stored(item)
         elif field.type == "POINTER":
             if isinstance(value, bpy.types.PropertyGroup):
                 check_stored(value)
@@ -39,7 +39,7 @@ def check_stored(group: Any) -> None:
 
 def _takes(field: Any, value: Any) -> bool:
     if field.type in ("FLOAT", "INT"):
-        return all(field.hard_min <= one <= field.hard_max for one in (value if field.is_array else (value,)))
+        return all(field.hard_min <= number <= field.hard_max for number in (value if field.is_array else (value,)))
     return field.type != "ENUM" or value != ""  # Blender gives no name to a number that names nothing
 
 
@@ -125,9 +125,9 @@ def _value(setting: bpy.types.Property, text: str, path: str) -> Any:
         return text
     if kind == "STRING":
         return text
-    kept: dict[str, Any] = {"Object": bpy.data.objects, "Image": bpy.data.images}
-    if kind == "POINTER" and (target := setting.fixed_type.identifier) in kept:
-        if text not in kept[target]:
+    blocks: dict[str, Any] = {"Object": bpy.data.objects, "Image": bpy.data.images}
+    if kind == "POINTER" and (target := setting.fixed_type.identifier) in blocks:
+        if text not in blocks[target]:
             raise InputError(f"'{path}' cannot be {text!r}: there is no {target.lower()} of that name.")
-        return kept[target][text]
+        return blocks[target][text]
     raise InputError(f"'{path}' is a group of settings: name one of those in it.")

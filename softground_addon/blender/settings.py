@@ -50,14 +50,14 @@ def options_of(context: bpy.types.Context) -> Any:
 
 
 def exists(obj: bpy.types.Object | None) -> bool:
-    """Whether an object that the settings name is there: those deleted in the viewport live on in the settings only."""
+    """Return whether an object of the settings is there: those deleted in the viewport live on in the settings only."""
     if obj is None:
         return False
-    users, found = state.existing.get(obj.session_uid, (-1, False))
+    users, linked = state.existing.get(obj.session_uid, (-1, False))
     if users != obj.users:
-        found = bool(obj.users_collection)
-        state.existing[obj.session_uid] = obj.users, found
-    return found
+        linked = bool(obj.users_collection)
+        state.existing[obj.session_uid] = obj.users, linked
+    return linked
 
 
 def forget_deleted_ground(scene: bpy.types.Scene) -> None:
@@ -120,7 +120,7 @@ def gravity_of(scene: bpy.types.Scene) -> float:
 
 
 def units_of(scene: bpy.types.Scene) -> SceneUnits:
-    """What frames and lengths of a scene come to, as they are now."""
+    """Frames and lengths of a scene, as they are now."""
     return SceneUnits(
         frame_rate=frame_rate_of(scene),
         time_stretch=time_stretch_of(scene),
@@ -190,12 +190,12 @@ def _calm(options: Any, units: SceneUnits) -> FeltWeather:
 
 
 def is_prop(character: Any) -> bool:
-    """Whether an entry of the characters is of objects without a rig."""
+    """Return whether an entry of the characters is of objects without a rig."""
     return character.armature is None and any(sole.object for sole in character.soles)
 
 
 def is_set_up(character: Any) -> bool:
-    """Whether an entry of the characters still has what leaves prints: an armature, or an object."""
+    """Return whether an entry of the characters still has what leaves prints: an armature, or an object."""
     return exists(character.armature) if character.armature else is_prop(character)
 
 
@@ -225,15 +225,19 @@ def character_of(character: Any) -> CharacterSettings:
         joints={entry.name: (bone, entry.end.lower()) for entry in character.joints if (bone := entry.bone)},
         soles=soles,
         holds=tuple(
-            FootHold(one.foot, float(one.frame), one.mode, typed(one.strength), float(one.ease_in), float(one.ease_out))
-            for one in character.holds
+            FootHold(
+                hold.foot, float(hold.frame), hold.mode, typed(hold.strength), float(hold.ease_in), float(hold.ease_out)
+            )
+            for hold in character.holds
         ),
     )
 
 
 def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
-    """What is asked of the characters, None if nothing."""
-    sunk = options.sink_feet and options.output == "BOTH" and any(one.armature for one in options.characters)
+    """Responses that are asked of the characters, None if nothing."""
+    sunk = (
+        options.sink_feet and options.output == "BOTH" and any(character.armature for character in options.characters)
+    )
     grounded = grounded or sunk or (options.grounding.use and options.output != "PRINTS")
     tilted = options.tilt.use and (grounded or options.output != "PRINTS")
     if not (tilted or grounded):
@@ -305,7 +309,7 @@ def as_preset(options: Any, name: str, source: str = "") -> Preset:
 
 
 def holds(options: Any, preset: Preset) -> bool:
-    """Whether the scene's ground is as a preset says, or will be with its first character."""
+    """Return whether the scene's ground is as a preset says, or will be with its first character."""
     for group, field, value in _of_preset(options, preset):
         if not options.characters and not group.is_property_set(field):
             continue
@@ -334,7 +338,7 @@ def take_defaults(options: Any) -> None:
 
 
 def default_preset() -> Preset:
-    """What scenes start with: the preset of the user's preferences, or the add-on's own where that is gone."""
+    """Preset that scenes start with: the one of the user's preferences, or the add-on's own where that is gone."""
     with suppress(InputError):
         return presets.find(_preferred(), (presets.FOLDER, user_folder()))
     return presets.find(presets.DEFAULT)
@@ -363,14 +367,14 @@ def untouched(options: Any) -> list[tuple[Any, str]]:
 
 
 def _of_preset(options: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
-    """What a preset says: groups of settings, names in them, values."""
+    """Contents of a preset: groups of settings, names in them, values."""
     material = options.material
     scale = {field: typed(options.length_scale) for field in _LENGTHS}
     said = [(material, field, getattr(preset.material, field) * scale.get(field, 1.0)) for field in MATERIAL_FIELDS]
     said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
     said += [(options, "debris", preset.debris)]
-    return [one for one in said if one[2] is not None]
+    return [entry for entry in said if entry[2] is not None]
 
 
 SMALL_SOLE = 0.1
@@ -382,7 +386,10 @@ _LENGTHS = ("rim_reach", "blur_sigma")
 
 def fit_cells(options: Any) -> None:
     """Set the cell size, and lengths for small soles, to what the preset says of them, unless the user has set them."""
-    count, lengths = options.cells_along_sole, [one.sole_length for one in options.characters if one.sole_length > 0]
+    count, lengths = (
+        options.cells_along_sole,
+        [character.sole_length for character in options.characters if character.sole_length > 0],
+    )
     if not lengths:
         return
     shortest = shortest_length(lengths)
@@ -391,7 +398,9 @@ def fit_cells(options: Any) -> None:
         options.cells_along_sole = count  # which a cell size of the user's own switches off
     with suppress(InputError):
         preset = presets.find(preset_of(options), (presets.FOLDER, user_folder()))
-        as_said = [one for one in _of_preset(options, preset) if one[1] in _LENGTHS and _is(*one)]
+        as_said = [
+            character for character in _of_preset(options, preset) if character[1] in _LENGTHS and _is(*character)
+        ]
         before, options.length_scale = options.length_scale, min(1.0, shortest / SMALL_SOLE)
         for group, field, value in as_said if options.length_scale != before else ():
             setattr(group, field, value / before * options.length_scale)

@@ -1,4 +1,4 @@
-"""What the add-on remembers from one call to the next, all of it: never saved with a file and no part of undo."""
+"""Memory of the add-on from one call to the next, all of it: never saved with a file and no part of undo."""
 
 from __future__ import annotations
 

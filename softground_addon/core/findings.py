@@ -1,4 +1,4 @@
-"""What a bake finds wrong with itself or with what it was given, and what to do about it."""
+"""Findings: faults of a bake or of what it was given, and what to do about them."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from .weather.felt_weather import FeltWeather
 
 
 class Acts(IntEnum):
-    """What a setting acts on first, in the order of a bake: a later one leaves what came before as it is."""
+    """First stage that a setting acts on, in the order of a bake: a later one leaves what came before as it is."""
 
     READING = 0
     """What is read from the scene."""
@@ -53,7 +53,7 @@ class ObjectName:
 
 @dataclass(frozen=True)
 class SoleSource:
-    """What one sole is made from.
+    """Sources of one sole.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class CharacterSettings:
 
 @dataclass(frozen=True)
 class ResponseOptions:
-    """What is asked of the characters; None where something is off."""
+    """Responses that are asked of the characters; None where something is off."""
 
     tilt: TiltOptions | None
     grounding: GroundingOptions | None
@@ -124,7 +124,7 @@ class ResponseOptions:
 
 @dataclass(frozen=True)
 class SceneUnits:
-    """What frames and lengths of a scene come to.
+    """Frames and lengths of a scene.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ class BakeSettings(SceneUnits):
 
     @property
     def fineness(self) -> Fineness:
-        """How finely the ground is pressed and shown, from which follows what a bake takes."""
+        """Fineness at which the ground is pressed and shown, from which follows what a bake takes."""
         return Fineness(self.cell_size_m, self.material.rim_reach, self.relief, self.relief_vertices)
 
     def between(self, first: Acts, last: Acts) -> dict[str, Any]:
@@ -249,10 +249,10 @@ class BakeSettings(SceneUnits):
 
 def _part(group: Any, first: Acts, last: Acts, inherited: Acts = Acts.READING) -> dict[str, Any]:
     """The fields of a dataclass that act on some stages, and those of what it holds."""
-    found: dict[str, Any] = {}
-    for one in fields(group):
-        value, acts = getattr(group, one.name), one.metadata.get("acts", inherited)
-        if one.metadata.get("said_if_on") and value == one.default:
+    values: dict[str, Any] = {}
+    for setting in fields(group):
+        value, acts = getattr(group, setting.name), setting.metadata.get("acts", inherited)
+        if setting.metadata.get("said_if_on") and value == setting.default:
             continue
         if _is_group(value):
             value = _part(value, first, last, acts)
@@ -263,8 +263,8 @@ def _part(group: Any, first: Acts, last: Acts, inherited: Acts = Acts.READING) -
         else:
             is_in = first <= acts <= last
         if is_in:
-            found[one.name] = value
-    return found
+            values[setting.name] = value
+    return values
 
 
 def _is_group(value: Any) -> bool:

@@ -40,7 +40,7 @@ MOST_MISSED = 0.02
 def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> None:
     """Raise InputError if nobody moves, and keys hold nobody in a pose."""
     still = [finding for motion in motions if (finding := no_motion(motion))]
-    rigs = [settings.found(one.armature) for one in wanted.characters if one.armature]
+    rigs = [settings.found(character.armature) for character in wanted.characters if character.armature]
     if len(still) == len(motions) and not any(map(holds_a_pose, rigs)):
         raise InputError(" ".join(finding.text for finding in still))
 
@@ -64,7 +64,7 @@ class Coverage:
     is_fine_somewhere: bool
 
     def is_coarse(self, cell_size: float) -> bool:
-        """Whether prints are not well shown."""
+        """Return whether prints are not well shown."""
         return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
 
 
@@ -97,7 +97,7 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
 
 
 def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, sole_length: float) -> bool:
-    """Whether the ground is to be refined along the trail; InputError if it must be and may not.
+    """Return whether the ground is to be refined along the trail; InputError if it must be and may not.
 
     `sole_length` is that of the shortest sole [m].
     """
@@ -138,8 +138,10 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
 def copy_findings(ground: bpy.types.Object) -> list[Finding]:
     """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
     # Nodes may scatter objects for renders only, and those stay.
-    hidden = (one for one in ground.modifiers if one.show_render and not one.show_viewport)
-    names = [f"'{one.name}'" for one in hidden if one.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")]
+    hidden = (modifier for modifier in ground.modifiers if modifier.show_render and not modifier.show_viewport)
+    names = [
+        f"'{modifier.name}'" for modifier in hidden if modifier.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")
+    ]
     if not names:
         return []
     return [

@@ -48,18 +48,20 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
 def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> list[Finding]:
     """Feet of which a mesh is there that is not rendered, so that they print with a sole of average shape."""
     findings = []
-    for one, motion in zip(wanted.characters, motions, strict=True):
+    for character, motion in zip(wanted.characters, motions, strict=True):
         average = {m.sole.name for m in motion.soles if m.sole.prop is None and m.sole.underside is None}
-        if not average or not one.armature:
+        if not average or not character.armature:
             continue
-        armature = settings.found(one.armature)
-        bones = {bone for sole in one.soles if sole.name in average for bone in (sole.bone, sole.toe_bone) if bone}
+        armature = settings.found(character.armature)
+        bones = {
+            bone for sole in character.soles if sole.name in average for bone in (sole.bone, sole.toe_bone) if bone
+        }
         findings += [
             Finding(
                 "hidden_skin",
                 "warning",
-                f"The feet of '{one.name}' print with a sole of average shape: '{body.name}', which covers them, is "
-                "hidden from renders.",
+                f"The feet of '{character.name}' print with a sole of average shape: '{body.name}', which covers them, "
+                "is hidden from renders.",
                 "Show it in renders and bake again, or leave it if those feet fit.",
             )
             for body in hidden_on(scene, armature, bones)[:1]
@@ -70,10 +72,10 @@ def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence
 def shapes_left_out(scene: bpy.types.Scene, wanted: BakeSettings) -> list[Finding]:
     """What shapes the skin of the feet and was not read."""
     findings = []
-    for one in wanted.characters:
-        if not one.armature:
+    for character in wanted.characters:
+        if not character.armature:
             continue
-        bones = {bone for sole in one.soles for bone in (sole.bone, sole.toe_bone, *sole.parts) if bone}
+        bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone, *sole.parts) if bone}
         findings += [
             Finding(
                 "skin_left_out",
@@ -81,7 +83,7 @@ def shapes_left_out(scene: bpy.types.Scene, wanted: BakeSettings) -> list[Findin
                 f"The skin of '{body}' was read without {' and '.join(causes)}.",
                 "Check that its feet lie in their prints; if not, apply it or switch it off.",
             )
-            for body, causes in left_out_on(scene, settings.found(one.armature), bones).items()
+            for body, causes in left_out_on(scene, settings.found(character.armature), bones).items()
         ]
     return findings
 

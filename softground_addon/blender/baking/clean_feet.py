@@ -80,7 +80,7 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
         raise InputError("No character here has feet to clean: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     assert wanted.response is not None
-    characters = tuple(_with_legs(one) for one in wanted.characters)
+    characters = tuple(_with_legs(moving) for moving in wanted.characters)
     wanted = replace(wanted, response=replace(wanted.response, tilt=None), characters=characters)
     response_job.check_characters(wanted.characters)
     shot = yield from read_shot(scene, wanted, LayerKind.CLEAN_FEET)
@@ -98,7 +98,7 @@ def _with_legs(character: CharacterSettings) -> CharacterSettings:
     """A character with the legs of feet that hang elsewhere or are the ends of shins, where no leg of it is mapped."""
     if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
         return character
-    armature, soles = settings.found(character.armature), [one.bone for one in character.soles if one.bone]
+    armature, soles = settings.found(character.armature), [sole.bone for sole in character.soles if sole.bone]
     legs = legs_of_feet(armature, soles) or legs_on_shins(armature, soles)
     return replace(character, joints={**character.joints, **legs})
 
@@ -107,12 +107,12 @@ def _cleaned(
     wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
 ) -> Job[tuple[list[CharacterResponse], Faults, list[str]]]:
     """Each rigged character's response, what its feet did before and do after, and which foot locks hold nothing."""
-    found: list[CharacterResponse] = []
+    responses: list[CharacterResponse] = []
     missed: list[str] = []
     feet: Faults = {"before": {}, "after": {}}
     now = Progress("simulate", 1.0)
     each = zip(shot.motions, loads, wanted.characters, strict=True)
-    rigged = [one for one in each if one[0].centre is None]
+    rigged = [entry for entry in each if entry[0].centre is None]
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
@@ -130,8 +130,8 @@ def _cleaned(
             feet[when][motion.name] = _statistics(faults)
         made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), posed_rim))
         left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), posed_rim))
-        found.append(CharacterResponse(motion, response, made, left, 0.0))
-    return found, feet, missed
+        responses.append(CharacterResponse(motion, response, made, left, 0.0))
+    return responses, feet, missed
 
 
 def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None:
@@ -172,8 +172,8 @@ def _travels(motion: CharacterMotion, travels: NDArray[np.bool_]) -> list[str]:
 def _left_out(wanted: BakeSettings, shot: Shot) -> tuple[str, ...]:
     """What is said of soles that are not feet."""
     names: list[str] = []
-    for motion, one in zip(shot.motions, wanted.characters, strict=True):
-        if one.armature:
+    for motion, character in zip(shot.motions, wanted.characters, strict=True):
+        if character.armature:
             feet = set(leg_soles(motion).values())
             names += [f"{sole.sole.name} of {motion.name}" for i, sole in enumerate(motion.soles) if i not in feet]
     return (f"Only feet with legs are cleaned; these stay as they are: {', '.join(names)}.",) if names else ()

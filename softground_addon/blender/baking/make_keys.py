@@ -55,8 +55,8 @@ class MadeKeys:
     @property
     def summary(self) -> str:
         """In a line."""
-        kept = f"; '{self.source}' is kept" if self.source else ""
-        return f"'{self.action}' animates {len(self.bones)} bones of '{self.character}'{kept}"
+        unchanged = f"; '{self.source}' is kept" if self.source else ""
+        return f"'{self.action}' animates {len(self.bones)} bones of '{self.character}'{unchanged}"
 
     @property
     def warning(self) -> str:
@@ -77,7 +77,11 @@ def make_keys(scene: bpy.types.Scene) -> Job[tuple[MadeKeys, ...]]:
     InputError
         If no character has a layer, or something would hide the new action; nothing is changed then.
     """
-    armatures = {one.armature: None for one in scene.softground.characters if one.armature and owners_of(one.armature)}
+    armatures = {
+        character.armature: None
+        for character in scene.softground.characters
+        if character.armature and owners_of(character.armature)
+    }
     if not armatures:
         raise InputError("No character here has a layer to make keys of: bake with Sink Feet on, or press Clean Feet.")
     for armature in armatures:
@@ -152,16 +156,18 @@ def _read(scene: bpy.types.Scene, name: str, start: float, share: float) -> Job[
     for place, bone in enumerate(bones):
         owner = armature.pose.bones[bone] if bone else armature
         moved = np.abs(poses[:, place, :3, 3] - places[:, place]).max() > LENGTH_TOLERANCE / size
-        if any(not (one.mute or is_own(one)) for one in owner.constraints):
+        if any(not (constraint.mute or is_own(constraint)) for constraint in owner.constraints):
             continue
         channels = [_turns(owner.rotation_mode, poses[:, place], np.array(turns[bone]))] if bone else []
         if moved:
             channels.append(("location", poses[:, place, :3, 3], LENGTH_TOLERANCE / size))
         curves[bone] = []
         for channel, values, tolerance in channels:
-            kept = kept_samples(values, tolerance)
+            reduced = kept_samples(values, tolerance)
             path, group = (path_of_bone(bone, channel), bone) if bone else (channel, "Object Transforms")
-            curves[bone] += [LayerCurve(path, i, group, times[kept], column) for i, column in enumerate(values[kept].T)]
+            curves[bone] += [
+                LayerCurve(path, i, group, times[reduced], column) for i, column in enumerate(values[reduced].T)
+            ]
     return curves
 
 
@@ -176,7 +182,11 @@ def _local(evaluated: bpy.types.Object, bone: str) -> Array:
     world = evaluated.matrix_world.to_3x3()
     basis = evaluated.matrix_basis.copy()
     from_world = (world @ basis.to_3x3().inverted()).inverted()
-    for layer in (one for one in evaluated.constraints if is_own(one) and not one.mute and one.target):
+    for layer in (
+        constraint
+        for constraint in evaluated.constraints
+        if is_own(constraint) and not constraint.mute and constraint.target
+    ):
         basis.translation += from_world @ (layer.influence * layer.target.matrix_world.translation)
     return np.array(basis)
 
@@ -204,24 +214,24 @@ def _assign(armature: bpy.types.Object, curves: dict[str, list[LayerCurve]]) -> 
     """Let the armature play a copy of its action with the curves in it, in the place of its layers."""
     layered = tuple(bone for bone in owners_of(armature) if bone not in curves)
     animation = armature.animation_data or armature.animation_data_create()
-    own, slot = animation.action, slot_of(animation)
+    source, slot = animation.action, slot_of(animation)
     flat = [curve for of_bone in curves.values() for curve in of_bone]
-    name = f"{own.name if own else armature.name} with Response"
-    if own is None or (slot is None and hasattr(own, "slots")):
+    name = f"{source.name if source else armature.name} with Response"
+    if source is None or (slot is None and hasattr(source, "slots")):
         action = new_action(name, armature, flat)
         assign_action(armature, action)
     else:
-        own.use_fake_user = True
-        action = own.copy()
+        source.use_fake_user = True
+        action = source.copy()
         action.name = name
         animation.action = action
-        set_slot(animation, next((one for one in getattr(action, "slots", ()) if one.handle == slot.handle), None))
+        set_slot(animation, next((item for item in getattr(action, "slots", ()) if item.handle == slot.handle), None))
         channels = channels_of(action, slot_of(animation))
         replaced = {(curve.path, curve.index) for curve in flat}
-        for curve in [one for one in channels if (one.data_path, one.array_index) in replaced]:
+        for curve in [item for item in channels if (item.data_path, item.array_index) in replaced]:
             channels.remove(curve)
         for curve in flat:
             add_curve(channels, curve)
-    action[response_job.SOURCE] = own.name if own else ""
+    action[response_job.SOURCE] = source.name if source else ""
     take_off(armature, set(curves))
-    return MadeKeys(armature.name, action.name, own.name if own else "", tuple(curves), layered)
+    return MadeKeys(armature.name, action.name, source.name if source else "", tuple(curves), layered)

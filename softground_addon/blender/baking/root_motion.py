@@ -67,21 +67,21 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     if not any(character.armature for character in characters_of(scene.softground)):
         raise InputError("No character here has a rig to move: add a character with an animated armature.")
     wanted = replace(settings_of(scene), response=None)
-    for one in wanted.characters:
-        if one.armature:
-            check_layerable(settings.found(one.armature))
+    for moving in wanted.characters:
+        if moving.armature:
+            check_layerable(settings.found(moving.armature))
     shot = yield from read_shot(scene, wanted, LayerKind.ROOT_MOTION)
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
-    for one, motion, of_character in zip(wanted.characters, shot.motions, loads, strict=True):
-        if not one.armature:
+    for moving, motion, of_character in zip(wanted.characters, shot.motions, loads, strict=True):
+        if not moving.armature:
             continue
         work = lacking_velocity.slices(motion, of_character, shot.terrain)
         velocity = yield from meanwhile(Progress("simulate", 1.0), work)
         if velocity is None:
             continue
-        travel, curves = _layer(scene, one, motion, wanted, velocity)
-        layers.append((one.armature, travel, curves))
+        travel, curves = _layer(scene, moving, motion, wanted, velocity)
+        layers.append((moving.armature, travel, curves))
     if not layers:
         raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
     for name, travel, curves in layers:

@@ -125,13 +125,13 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
     if not idle:
         return
     names, paths = map(dict.fromkeys, zip(*idle, strict=True))
-    held, many = bool(bpy.app.autoexec_fail), len(idle) > 1
+    held, several = bool(bpy.app.autoexec_fail), len(idle) > 1
     yield Finding(
         "idle_drivers",
         "warning",
-        f"{len(idle)} driver{'s' if many else ''} of {listed(names)} {'do' if many else 'does'} not run (on "
+        f"{len(idle)} driver{'s' if several else ''} of {listed(names)} {'do' if several else 'does'} not run (on "
         f"{listed(paths)}){', as Auto Run Python Scripts is off' if held else ''}, and nothing moves by "
-        f"{'them' if many else 'it'}",
+        f"{'them' if several else 'it'}",
         "switch it on in Preferences > Save & Load and open the file again, or key what they do (Object > Animation > "
         "Bake Action)."
         if held

@@ -107,4 +107,4 @@ def _windows(
     """Where the prints of two sets of edits differ."""
     unedited = dict(enumerate(baked))
     pairs = ([left.get(n, unedited.get(n)) for left in (before, after)] for n in sorted({*before, *after}))
-    return [one.window for pair in pairs if pair[0] is not pair[1] for one in pair if one]
+    return [side.window for pair in pairs if pair[0] is not pair[1] for side in pair if side]

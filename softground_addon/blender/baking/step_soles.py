@@ -48,7 +48,7 @@ def edits_with_soles(
     if edits == {}:
         return {}
     ground = settings.found(wanted.ground) if wanted.ground else None
-    on_ground = baked_ground.edits_of(ground, [one.name for one in wanted.characters]) if ground else {}
+    on_ground = baked_ground.edits_of(ground, [character.name for character in wanted.characters]) if ground else {}
     edits = on_ground if edits is None else edits
     named = {edit.sole for edit in edits.values() if edit.sole}
     here = {name: read(obj, ground, wanted.unit_scale_m) for name in sorted(named) if (obj := object_of(scene, name))}

@@ -334,8 +334,8 @@ def add_vertex_contacts(character: SoftGroundCharacter, skin: bpy.types.Object) 
     mesh.vertices.foreach_get("select", chosen)
     edges = np.zeros(2 * len(mesh.edges), dtype=np.int32)
     mesh.edges.foreach_get("vertices", edges)
-    one, other = edges.reshape(-1, 2)[chosen[edges.reshape(-1, 2)].all(axis=1)].T
-    patch, bones = components(len(chosen), one, other), character.armature.data.bones
+    start, other = edges.reshape(-1, 2)[chosen[edges.reshape(-1, 2)].all(axis=1)].T
+    patch, bones = components(len(chosen), start, other), character.armature.data.bones
     carried: dict[str, set[str]] = {}
     for number in np.unique(patch[chosen]):
         weights: dict[str, float] = {}

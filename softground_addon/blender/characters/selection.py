@@ -63,7 +63,7 @@ def _check_no_crowd(scene: bpy.types.Scene, picked: Sequence[bpy.types.Object]) 
 
 
 def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
-    """Whether what is selected says of no character whom to add: nothing, a camera, or Blender's first cube alone."""
+    """Return whether the selection names no character to add: nothing, a camera, or Blender's first cube alone."""
     if len(selected) != 1:
         return not selected
     obj = selected[0]
@@ -73,7 +73,7 @@ def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
 
 
 def moves(obj: bpy.types.Object) -> bool:
-    """Whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
+    """Return whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
     return is_animated(obj) or is_simulated(obj)
 
 
@@ -82,7 +82,7 @@ def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[b
     if obj.type == "ARMATURE" or instances_armature(obj):
         return [obj]
     if obj.type == "MESH":
-        above = [one for one in ancestors(obj) if one.type == "ARMATURE" and one not in known]
+        above = [parent for parent in ancestors(obj) if parent.type == "ARMATURE" and parent not in known]
         wears = obj.find_armature()
         return [wears] if wears else above[:1]
     return [below for below in obj.children_recursive if below.type == "ARMATURE"]
@@ -102,14 +102,14 @@ def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Ob
 
 def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
     """What an object follows by its constraints and parents, and what those follow."""
-    found: set[bpy.types.Object] = set()
+    reached: set[bpy.types.Object] = set()
     waiting = [obj]
     while waiting:
-        one = waiting.pop()
-        further = (leaders(one) | set(ancestors(one))) - found
-        found |= further
+        follower = waiting.pop()
+        further = (leaders(follower) | set(ancestors(follower))) - reached
+        reached |= further
         waiting += further
-    return found - {obj}
+    return reached - {obj}
 
 
 def walkers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -1,1 +1,1 @@
-"""What a bake throws, as an object of points that plays by itself."""
+"""Debris of a bake, as an object of points that plays by itself."""

@@ -160,7 +160,7 @@ class _Graph(NodeGraph):
         return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
 
     def less(self, first: Any, second: Any) -> Any:
-        """Whether one is less than the other."""
+        """Return whether one is less than the other."""
         return self.compare("LESS_THAN", first, second)
 
     def joined(self, *geometries: Any) -> Any:

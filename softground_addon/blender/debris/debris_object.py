@@ -138,7 +138,7 @@ def _is_left_for(ground: bpy.types.Object, obj: bpy.types.Object) -> bool:
 
 
 def _origin_of(debris: bpy.types.Object) -> Vector:
-    """Where the origin of its points is in the world, if the user has not moved it [Blender units]."""
+    """Origin of its points in the world, if the user has not moved it [Blender units]."""
     return Vector(cast("bpy.types.Mesh", debris.data).get(ORIGIN, debris.matrix_parent_inverse.inverted().translation))
 
 
@@ -149,7 +149,7 @@ def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
 
 
 def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, unit_scale: float) -> AtRest:
-    """Where the pieces of debris come to rest in the wind of the moment; those that never do are left out.
+    """Places where the pieces of debris come to rest in the wind of the moment, without those that never do.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, un
     count, modifier = len(points.vertices), _modifier_of(obj)
 
     def values(name: str) -> NDArray[np.float64]:
-        found = np.empty(count, np.float32)
-        points.attributes[name].data.foreach_get("value", found)
-        return found.astype(np.float64)
+        numbers = np.empty(count, np.float32)
+        points.attributes[name].data.foreach_get("value", numbers)
+        return numbers.astype(np.float64)
 
     place = np.empty(count * 3, np.float32)
     points.vertices.foreach_get("co", place)
@@ -218,9 +218,9 @@ def remove(ground: bpy.types.Object) -> None:
 
 def _remove_unused() -> None:
     """Remove the groups and shapes that no debris has any more."""
-    for group in [one for one in bpy.data.node_groups if one.get(nodes.MARK) and not one.users]:
+    for group in [block for block in bpy.data.node_groups if block.get(nodes.MARK) and not block.users]:
         bpy.data.node_groups.remove(group)
-    for shapes in [one for one in bpy.data.collections if one.get(nodes.MARK) and not one.users]:
+    for shapes in [block for block in bpy.data.collections if block.get(nodes.MARK) and not block.users]:
         debris_shapes.remove(shapes)
 
 
@@ -272,7 +272,7 @@ def _play(modifier: Any, group: Any) -> None:
 
 
 def _settings_of(modifier: Any) -> dict[str, Any]:
-    """What the artist set of the older debris: wind, amount, how many are shaped, and shapes of their own."""
+    """Settings of the artist on the older debris: wind, amount, share that is shaped, and shapes of their own."""
     sockets = inputs_of(modifier)
     values = {name: compat.read_input(modifier, sockets[name]) for name in (*_AT_FIRST, "Shapes")}
     if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):

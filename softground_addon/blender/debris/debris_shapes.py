@@ -1,4 +1,4 @@
-"""What pieces look like: a small collection for each surface, which an artist may replace by one of their own."""
+"""Shapes of pieces: a small collection for each surface, which an artist may replace by one of their own."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def _material(surface: SurfaceRecord) -> bpy.types.Material:
         through, mixed = nodes.new("ShaderNodeBsdfTranslucent"), nodes.new("ShaderNodeMixShader")
         through.inputs["Color"].default_value = colour
         mixed.inputs[0].default_value = surface.fragments.translucency
-        for number, one in enumerate((shader, through), 1):
-            links.new(one.outputs[0], mixed.inputs[number])
+        for number, shader_node in enumerate((shader, through), 1):
+            links.new(shader_node.outputs[0], mixed.inputs[number])
         links.new(mixed.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
         # EEVEE lets no light through closed pieces that lie in their own shadow, and draws that share of them dark.
         solid = nodes.new("ShaderNodeOutputMaterial")

@@ -70,7 +70,7 @@ def display_mesh_of(ground: bpy.types.Object) -> bpy.types.Object:
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
-    """Whether a bake is on this ground."""
+    """Return whether a bake is on this ground."""
     return ground_mesh.is_baked(display_mesh_of(ground))
 
 
@@ -80,7 +80,7 @@ def is_deleted(ground: bpy.types.Object) -> bool:
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
-    """Whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
+    """Return whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
     return ground_mesh.has_remains(display_mesh_of(ground)) or hidden_ground.hides(ground)
 
 
@@ -114,8 +114,8 @@ def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, 
 def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """A draft of the ground refined along the trail; a bake that lies on the ground itself is taken off."""
     below, above = name_of(ground), name_of(draft)
-    if there := trail_detail.detail_of(ground):  # and gets what is written to the draft
-        ground_checks.check_playable(there)
+    if detail := trail_detail.detail_of(ground):  # and gets what is written to the draft
+        ground_checks.check_playable(detail)
 
     def publish() -> bpy.types.Object:
         ground_mesh.restore(found(below))
@@ -204,10 +204,10 @@ def _as_before_if_it_fails(name: ObjectName) -> Iterator[None]:
     except BaseException:
         playback.remove(found(name))
         newer: Any = ground_mesh.mesh_of(found(name))
-        kept = newer.name
+        former = newer.name
         newer.user_remap(older)
         ground_mesh.remove_mesh(newer)
-        older.name = kept
+        older.name = former
         for shown, group in played:
             playback.play(found(shown), group)
             group.use_fake_user = False
@@ -298,7 +298,7 @@ def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str
     except InputError:
         return {}
     with suppress(KeyError, TypeError, ValueError):  # of damaged inputs, and where there are more or fewer by now
-        before = [str(one["name"]) for one in left.about["inputs"]["characters"]]
+        before = [str(character["name"]) for character in left.about["inputs"]["characters"]]
         return with_names(left.edits, dict(zip(before, names, strict=True)))
     return left.edits
 

@@ -185,8 +185,8 @@ def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> N
     shown = active is not None and active.is_visible and active.collection.is_editable
     (active.collection if active and shown else scene.collection).objects.link(ground)
     scene.softground.ground = ground
-    for one in scene.view_layers:
-        one.update()
+    for view_layer in scene.view_layers:
+        view_layer.update()
 
 
 def select(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:

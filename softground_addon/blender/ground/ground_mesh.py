@@ -103,17 +103,17 @@ def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
 
 def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
     """The modifiers of the ground that play no bake and no weather over it."""
-    own = (playback.modifier_of(ground), weather_modifier.modifier_of(ground))
-    return [item for item in ground.modifiers if item not in own]
+    ours = (playback.modifier_of(ground), weather_modifier.modifier_of(ground))
+    return [item for item in ground.modifiers if item not in ours]
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
-    """Whether a bake is on this ground."""
+    """Return whether a bake is on this ground."""
     return has_remains(ground) and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
-    """Whether a bake is on this ground, or at least what a bake would take away again."""
+    """Return whether a bake is on this ground, or at least what a bake would take away again."""
     return ground.type == "MESH" and own_data.has_made(mesh_of(ground), REST)
 
 
@@ -195,7 +195,7 @@ def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
     it: only Blender can tell then, by evaluating the object in a scene that shows it.
     """
     parent, body = obj.parent, obj.rigid_body
-    if any(not one.mute for one in obj.constraints) or (body and body.type == "ACTIVE"):
+    if any(not constraint.mute for constraint in obj.constraints) or (body and body.type == "ACTIVE"):
         return None
     if parent is None:
         return obj.matrix_basis
@@ -221,8 +221,8 @@ def stand_in(
     """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     for shown_in in ground.users_scene[:1]:
-        scene.frame_current, there = shown_in.softground.frame_start, shown_in.render
-        scene.render.frame_map_old, scene.render.frame_map_new = there.frame_map_old, there.frame_map_new
+        scene.frame_current, render = shown_in.softground.frame_start, shown_in.render
+        scene.render.frame_map_old, scene.render.frame_map_new = render.frame_map_old, render.frame_map_new
     if weather_at is not None:
         scene.frame_current = weather_at
     copy = ground.copy()
@@ -302,8 +302,8 @@ def write(
     """
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    kept = own_data.attribute(mesh, REST, "FLOAT_VECTOR")
-    kept.data.foreach_set("vector", rest.ravel())
+    rest_attribute = own_data.attribute(mesh, REST, "FLOAT_VECTOR")
+    rest_attribute.data.foreach_set("vector", rest.ravel())
     up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
     raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
@@ -399,9 +399,9 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     attribute = mesh.attributes[REST] if own_data.has_made(mesh, REST) else None
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return mesh_arrays.positions(mesh)
-    kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    attribute.data.foreach_get("vector", kept)
-    rest = kept.reshape(-1, 3)
+    flat = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    attribute.data.foreach_get("vector", flat)
+    rest = flat.reshape(-1, 3)
     moves = playback.moves(mesh)
     if moves is not None:
         shown = _shown_positions(mesh)

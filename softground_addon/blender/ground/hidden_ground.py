@@ -18,12 +18,12 @@ _BY_DEFAULT = (False, False, True, True)
 
 
 def hides(ground: bpy.types.Object) -> bool:
-    """Whether the ground is hidden in favour of a copy."""
+    """Return whether the ground is hidden in favour of a copy."""
     return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def may_hide(ground: bpy.types.Object) -> bool:
-    """Whether the ground stays hidden once it is, with nothing that shows it again at another frame."""
+    """Return whether the ground stays hidden once it is, with nothing that shows it again at another frame."""
     return not any(path in _SHOWN for path, _ in animated_paths(ground))
 
 
@@ -34,7 +34,7 @@ def hide(ground: bpy.types.Object) -> None:
     before = [getattr(ground, name) for name in _SHOWN]
     scattered: dict[frozenset[str], bool] = {}  # by the modifiers that are shown, which mostly are the same in both
     for kind in ("viewport", "render"):
-        shown = frozenset(one.name for one in ground.modifiers if getattr(one, f"show_{kind}"))
+        shown = frozenset(modifier.name for modifier in ground.modifiers if getattr(modifier, f"show_{kind}"))
         if shown not in scattered:
             scattered[shown] = _is_scattered_on(ground, shown)
         if scattered[shown]:
@@ -48,14 +48,14 @@ def show_again(ground: bpy.types.Object) -> None:
     """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
     if not hides(ground):
         return
-    kept: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
-    for name, value in zip(_SHOWN, kept if len(kept) == len(_SHOWN) else _BY_DEFAULT, strict=True):
+    before: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
+    for name, value in zip(_SHOWN, before if len(before) == len(_SHOWN) else _BY_DEFAULT, strict=True):
         setattr(ground, name, bool(value))
     del ground[WAS_HIDDEN]
 
 
 def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
-    """Whether the ground has particles, or instances while some of its modifiers are shown, by their names."""
+    """Return whether the ground has particles, or instances while some of its modifiers are shown, by their names."""
     if ground.particle_systems:
         return True
     if not any(modifier.type == "NODES" and modifier.name in shown for modifier in ground.modifiers):
@@ -67,4 +67,8 @@ def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
         layer = copy.users_scene[0].view_layers[0]
         layer.update()
         depsgraph = cast("bpy.types.Depsgraph", layer.depsgraph)
-        return any(one.parent and one.parent.original == copy for one in depsgraph.object_instances if one.is_instance)
+        return any(
+            instance.parent and instance.parent.original == copy
+            for instance in depsgraph.object_instances
+            if instance.is_instance
+        )

@@ -30,7 +30,7 @@ MARGIN = 0.1
 def are_undone(
     ground: bpy.types.Object, vertices: Array, moved: Indices, terrain: Terrain, *, unit_scale: float, detail: str
 ) -> bool:
-    """Whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
+    """Return whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
 
     Parameters
     ----------

@@ -70,11 +70,11 @@ def build(
         Names of the vertex groups of the source, which only its object knows.
     """
     mesh = bpy.data.meshes.new(name)
-    kept = refinement.kept_faces
+    unrefined = refinement.kept_faces
     size = np.diff(surface.face_start)
-    kept_corners = _runs(surface.face_start[kept], size[kept])
+    kept_corners = _runs(surface.face_start[unrefined], size[unrefined])
     corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.corner_vertex])
-    kept_start = np.cumsum(size[kept]) - size[kept]
+    kept_start = np.cumsum(size[unrefined]) - size[unrefined]
     face_start = np.concatenate([kept_start, len(kept_corners) + refinement.face_start[:-1]])
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
@@ -97,7 +97,7 @@ def build(
         elif attribute.domain == "CORNER":
             values = refinement.at_corners(surface, values, kept_corners)
         elif attribute.domain == "FACE":
-            values = values[np.concatenate([kept, surface.triangle_face[refinement.source]])]
+            values = values[np.concatenate([unrefined, surface.triangle_face[refinement.source]])]
         else:
             values = np.where((edges >= 0).reshape(-1, *[1] * (values.ndim - 1)), values[edges], 0).astype(values.dtype)
         _write(mesh, attribute, values)
@@ -118,9 +118,9 @@ def _copy_vertex_groups(
     for number, name in enumerate(groups):
         group = holder.vertex_groups.new(name=name)
         chosen = of_group == number
-        own = np.zeros(len(source.vertices))
-        own[vertex[chosen].astype(np.intp)] = weight[chosen]
-        everywhere = refinement.at_vertices(surface, own).astype(np.float32)
+        weights = np.zeros(len(source.vertices))
+        weights[vertex[chosen].astype(np.intp)] = weight[chosen]
+        everywhere = refinement.at_vertices(surface, weights).astype(np.float32)
         inside = np.flatnonzero(everywhere)
         order = inside[np.argsort(everywhere[inside], kind="stable")]
         levels, first = np.unique(everywhere[order], return_index=True)

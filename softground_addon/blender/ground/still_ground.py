@@ -32,9 +32,9 @@ def mover_of(obj: bpy.types.Object) -> bpy.types.Object | None:
         paths = (path for path, _ in animated_paths(node) if node.type == "ARMATURE" or path.startswith(_PLACING))
         if any(paths):
             return node
-        constraints: list[Any] = [one for one in node.constraints if not one.mute and one.influence]
-        followed = [getattr(one, "target", None) for one in constraints]
-        followed += [one.target for constraint in constraints for one in getattr(constraint, "targets", ())]
+        constraints: list[Any] = [item for item in node.constraints if not item.mute and item.influence]
+        followed = [getattr(item, "target", None) for item in constraints]
+        followed += [item.target for constraint in constraints for item in getattr(constraint, "targets", ())]
         waiting += filter(None, (node.parent, *followed))
     return None
 
@@ -58,12 +58,12 @@ def changes_shape(obj: bpy.types.Object) -> str:
 
 def _changes(modifier: Any, ground: bpy.types.Object, keyed: tuple[str, ...]) -> bool:
     path = modifier.path_from_id()
-    if modifier.type in TIME_DEPENDENT or any(one.startswith(path) for one in keyed):
+    if modifier.type in TIME_DEPENDENT or any(item.startswith(path) for item in keyed):
         return True
     if any(node.bl_idname in TIME_NODES for node in nodes_of(modifier)):
         return True
-    settings = [getattr(modifier, one.identifier) for one in modifier.bl_rna.properties if one.type == "POINTER"]
+    settings = [getattr(modifier, item.identifier) for item in modifier.bl_rna.properties if item.type == "POINTER"]
     inputs = [value for _, value in node_inputs(modifier)] if modifier.type == "NODES" else []
     inputs += [*settings, *named_by_nodes(modifier)]
-    followed = [one for one in inputs if isinstance(one, bpy.types.Object) and one != ground]
-    return any(mover_of(one) for one in followed)
+    followed = [item for item in inputs if isinstance(item, bpy.types.Object) and item != ground]
+    return any(mover_of(item) for item in followed)

@@ -79,7 +79,9 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
         del surface, refinement  # they may be large, and the draft is there for long
         detail = ground.copy()
         detail.name = f"{ground.name} Trail"
-        for modifier in [one for one in detail.modifiers if one.type != "COLLISION"]:  # what others collide with stays
+        for modifier in [
+            item for item in detail.modifiers if item.type != "COLLISION"
+        ]:  # what others collide with stays
             detail.modifiers.remove(modifier)
         detail.data = mesh
         show_again(detail)

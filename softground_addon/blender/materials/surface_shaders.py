@@ -106,9 +106,9 @@ def _ripples(graph: Graph, ground: Ground) -> Socket:
     along = graph.out(wind, 1) * (1.0 / RIPPLE) + graph.noise(ground.place, 0.35, 2.0, 0.5) * 3.5
     phase = graph.math("FRACT", along, 0.0)
     wave = graph.ramp(phase, 0.0, LEE) * graph.ramp(phase, LEE, 1.0, 1.0, 0.0)
-    there = graph.ramp(graph.noise(ground.place, 2.5, 2.0), 0.38, 0.58, 0.25, 1.0)
+    patches = graph.ramp(graph.noise(ground.place, 2.5, 2.0), 0.38, 0.58, 0.25, 1.0)
     left = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
-    return wave * there * left * RIPPLE_HEIGHT
+    return wave * patches * left * RIPPLE_HEIGHT
 
 
 def dry_sand(graph: Graph, ground: Ground) -> Look:

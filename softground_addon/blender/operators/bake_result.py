@@ -26,21 +26,21 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
 
 
 def _result(layout: Any, summary: Any) -> None:
-    """What the bake that is on the ground came to."""
+    """Result of the bake that is on the ground."""
     typical, most = (f"{depth * 100:.1f} cm" for depth in (summary[bake_report.TYPICAL], summary["max_depth_m"]))
     depth = typical if typical == most else f"{typical}, up to {most}"
     layout.label(text=f"{summary['steps']:.0f} steps, {depth}", icon="CHECKMARK", translate=False)
 
 
 def _warnings(layout: Any, warnings: Sequence[str]) -> None:
-    """How many warnings a bake has; they are long, and shown when asked for."""
+    """Count of a bake's warnings, which are long, and shown when asked for."""
     if warnings:
         text = f"{len(warnings)} Warnings" if len(warnings) > 1 else "1 Warning"
         layout.operator("softground.show_warnings", text=text, icon="ERROR", translate=False)
 
 
 def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
-    """How far the feet are above the prints that they made, and a button that lets them down."""
+    """Height of the feet above the prints that they made, and a button that lets them down."""
     floating = summary.get(bake_report.FLOATING, 0.0)
     if floating < NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
         return
@@ -86,7 +86,7 @@ _WARNING_WIDTH = 90
 
 
 def warnings_of(scene: bpy.types.Scene) -> list[str]:
-    """What the user should know of the bake on the scene's ground."""
+    """Findings on the bake on the scene's ground."""
     ground = scene.softground.ground
     return ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if ground else []
 

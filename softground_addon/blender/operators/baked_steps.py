@@ -44,7 +44,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def is_edited(self) -> bool:
-        """Whether there is anything to be reset."""
+        """Return whether there is anything to be reset."""
         return self.is_copy or self.edit != UNCHANGED
 
     @property
@@ -66,7 +66,7 @@ class BakedStep(record.EditableStep):
 
     @cached_property
     def depth_cm(self) -> float:
-        """How deep it is now [cm]."""
+        """Depth of the step now [cm]."""
         return self.left.max_depth_m * 100 if self.left else 0.0
 
     @property
@@ -83,7 +83,7 @@ class BakedStep(record.EditableStep):
         return np.column_stack([outline, np.full(len(outline), self.height)])
 
     def ahead(self) -> tuple[float, float]:
-        """Where it would be moved to lie ahead of where it is, along world x and y [m]."""
+        """Place ahead of the step, along world x and y [m]."""
         along = np.array([np.cos(heading := (self.left or self.baked).heading), np.sin(heading)])
         length = float(np.ptp(self.outline()[:, :2] @ along))
         x, y = np.array(self.edit.move_m) + APART * length * along
@@ -91,7 +91,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def has_foot(self) -> bool:
-        """Whether a foot made it, and neither a ball nor a wheel."""
+        """Return whether a foot made it, and neither a ball nor a wheel."""
         made_by = self.baked.pressed_by
         return made_by is not None and made_by.pressing.sole.prop is None
 
@@ -100,14 +100,14 @@ class BakedStep(record.EditableStep):
         return self._sole_outline(edit) if self.has_foot else self._touched
 
     def _sole_outline(self, edit: StepEdit) -> Array:
-        steps, own = self._at_peak
-        other = sole_of(edit, own, self.feet)
-        pose = swapped(steps, own, other).poses[0, 0]
+        steps, sole = self._at_peak
+        other = sole_of(edit, sole, self.feet)
+        pose = swapped(steps, sole, other).poses[0, 0]
         return np.asarray(other.sole.outline @ pose[:2, :2].T + pose[:2, 3])
 
     @cached_property
     def _at_peak(self) -> tuple[Steps, PressingSole]:
-        """What its sole did where its force was largest."""
+        """Motion of its sole where its force was largest."""
         made_by, step = self.baked.pressed_by, self.baked
         assert made_by is not None
         steps, peak = made_by.steps(step.load_frames), int(step.load_n.argmax())
@@ -126,7 +126,7 @@ class BakedStep(record.EditableStep):
 
 @dataclass(frozen=True, eq=False)
 class ShownBake:
-    """What is shown of a bake: its steps in order, its footprints as they were left, and how far rims reach [m]."""
+    """Steps of a bake in order, its footprints as they were left, and the reach of rims [m]."""
 
     steps: Sequence[BakedStep] = ()
     footprints: Sequence[Footprint] = ()
@@ -147,7 +147,7 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
             left = record.load(bytes(stored))
             soles = feet(left.footprints)
             steps = [
-                BakedStep(**vars(one), number=number, feet=soles) for number, one in enumerate(left.steps, start=1)
+                BakedStep(**vars(step), number=number, feet=soles) for number, step in enumerate(left.steps, start=1)
             ]
             state.shown_bake = {key: ShownBake(steps, left.edited, baked_ground.baked_with(left.about, "rim_reach"))}
     except InputError:

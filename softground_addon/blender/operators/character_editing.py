@@ -52,14 +52,14 @@ class _OnCharacter:
         """
         if not self.character:
             return active_character(options)
-        for one in options.characters:
-            if character_setup.title_of(one) == self.character:
-                return one
+        for character in options.characters:
+            if character_setup.title_of(character) == self.character:
+                return character
         raise InputError(f"There is no character '{self.character}': select one in the list.")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen."""
+        """Return whether a character is chosen."""
         if active_character(settings.options_of(context)) is None:
             cast("Any", cls).poll_message_set("Add a character first")
             return False
@@ -124,11 +124,11 @@ class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
 
 
 class _ReadingCharacter(_OnCharacter, Reading):
-    """What operators on a character that read its animation have in common."""
+    """Base of operators on a character that read its animation."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen, and no other job runs."""
+        """Return whether a character is chosen, and no other job runs."""
         return super().poll(context) and Reading.poll.__func__(cls, context)
 
 
@@ -179,21 +179,21 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
         scene = settings.scene_of(context)
         posed = context.object if context.mode == "POSE" else None
         if posed is not None:
-            character = next((one for one in scene.softground.characters if one.armature == posed), None)
+            character = next((item for item in scene.softground.characters if item.armature == posed), None)
             if character is None:
                 raise InputError(f"'{posed.name}' is not a character yet: press Add Character first.")
             bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
             added = character_setup.add_bone_contacts(character, bones)
         elif context.mode == "EDIT_MESH" and context.object is not None:
             rig = context.object.find_armature()
-            character = next((one for one in scene.softground.characters if rig and one.armature == rig), None)
+            character = next((item for item in scene.softground.characters if rig and item.armature == rig), None)
             if character is None:
                 raise InputError(f"'{context.object.name}' is not the skin of a character: press Add Character first.")
             added = character_setup.add_vertex_contacts(character, context.object)
         else:
             characters = scene.softground.characters
-            props = [obj for obj in context.selected_objects if all(obj != one.armature for one in characters)]
-            wearer = next((one for one in characters if any(one.armature in ancestors(obj) for obj in props)), None)
+            props = [obj for obj in context.selected_objects if all(obj != item.armature for item in characters)]
+            wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene.softground)
             added = character_setup.add_object_contacts(scene, character, props)
         self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")

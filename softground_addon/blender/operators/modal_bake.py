@@ -58,7 +58,7 @@ _NAVIGATION = (
 
 
 class ModalJob(bpy.types.Operator):
-    """What operators with a job have in common: blocking in a script, modal for the user."""
+    """Base of operators with a job: blocking in a script, modal for the user."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -70,7 +70,7 @@ class ModalJob(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Whether no other job runs."""
+        """Return whether no other job runs."""
         cls.poll_message_set(BUSY)
         return not session.current().is_baking
 
@@ -230,7 +230,7 @@ class ModalJob(bpy.types.Operator):
 
 
 class Reading(ModalJob):
-    """What operators that read the shot for its prediction have in common."""
+    """Base of operators that read the shot for its prediction."""
 
     def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
         return nullcontext()
@@ -244,7 +244,7 @@ class Reading(ModalJob):
 
 
 class ReadingShot(OnShot, Reading):
-    """What operators that read the shot as it is have in common."""
+    """Base of operators that read the shot as it is."""
 
     bl_options = {"REGISTER"}
 
@@ -255,11 +255,11 @@ class ReadingShot(OnShot, Reading):
 
 
 class _Bake(ModalJob):
-    """What operators that bake have in common."""
+    """Base of operators that bake."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is something to bake; otherwise the button says what is missing."""
+        """Return whether there is something to bake; otherwise the button says what is missing."""
         reason = _why_not(context)
         if reason:
             cls.poll_message_set(reason)
@@ -270,7 +270,7 @@ class _Bake(ModalJob):
 
 
 class _Pressing(_Bake):
-    """What operators that press the ground have in common."""
+    """Base of operators that press the ground."""
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
         yield from prediction.settling(scene)
@@ -281,7 +281,7 @@ class _Pressing(_Bake):
 
 
 class _BakeFootprints(_Pressing):
-    """What both buttons that bake do."""
+    """Base of both buttons that bake."""
 
     cancelled = "Bake cancelled: nothing was changed"
 
@@ -322,7 +322,7 @@ class SOFTGROUND_OT_bake_again(_BakeFootprints):
 
     @classmethod
     def description(cls, _context: bpy.types.Context, _properties: Any) -> str:
-        """What has changed, all of it: the panel has a line."""
+        """Changes since the bake, all of them: the panel has a line."""
         return "\n".join((cls.bl_description, *session.current().stale.splitlines()))
 
 
@@ -343,7 +343,7 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
 
 
 class _ChangingTheMotion(_Bake):
-    """What operators have in common whose layer changes the motion that bakes read."""
+    """Base of operators whose layer changes the motion that bakes read."""
 
     def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
         return nullcontext()
@@ -433,7 +433,7 @@ class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Whether there is a bake to cancel."""
+        """Return whether there is a bake to cancel."""
         cls.poll_message_set("No bake is running")
         return bool(session.current().is_baking)
 
@@ -449,7 +449,7 @@ def stop() -> None:
 
 
 def _why_not(context: bpy.types.Context) -> str:
-    """What keeps a bake from starting, or an empty text."""
+    """Reason that keeps a bake from starting, or an empty text."""
     panel = session.current()
     if panel.is_baking:
         return BUSY
@@ -478,14 +478,14 @@ def _count_of_blocks() -> int:
 
 def _check_still_there(needed: dict[int, str]) -> None:
     """Raise InputError if something that a job reads was deleted meanwhile: Blender does not survive its use."""
-    there = {uid for scene in bpy.data.scenes for uid in _needed_by_job(scene)}  # Blender takes out what is deleted
+    present = {uid for scene in bpy.data.scenes for uid in _needed_by_job(scene)}  # Blender takes out what is deleted
     for uid, name in needed.items():
-        if uid not in there and settings.find(ObjectName(name, uid)) is None:
+        if uid not in present and settings.find(ObjectName(name, uid)) is None:
             raise InputError(f"'{name}' was deleted while the bake read it: nothing was changed. Bake again.")
 
 
 def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
-    """Whether an event neither edits, saves nor renders: it navigates, or clicks in our panels, grey but for Cancel."""
+    """Return whether an event neither edits, saves nor renders: it navigates, or clicks in grey panels."""
     if event.type.startswith(_NAVIGATION):
         return not event.ctrl  # the wheel turns a field's value with it
     if event.type != "LEFTMOUSE":

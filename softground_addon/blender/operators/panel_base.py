@@ -1,4 +1,4 @@
-"""What the sidebar's panels have in common."""
+"""Base of the sidebar's panels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What panels and the overlay tell of a bake before there is one.
+"""Prediction of a bake before there is one, for panels and the overlay.
 
 Nothing is computed while they are drawn: what has changed is worked out right after, and until then they show what they
 knew last.
@@ -48,7 +48,7 @@ class _Aim:
 
 @dataclass(frozen=True)
 class DepthPrediction:
-    """What is known of a bake to come.
+    """Knowledge of a bake to come.
 
     Attributes
     ----------

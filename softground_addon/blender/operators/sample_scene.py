@@ -158,7 +158,7 @@ class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether an object can be added."""
+        """Return whether an object can be added."""
         cls.poll_message_set("Leave Edit Mode first")
         return context.mode == "OBJECT"
 

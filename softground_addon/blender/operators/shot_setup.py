@@ -1,4 +1,4 @@
-"""What the buttons do. Each operator is thin: it calls one function, and its errors become a report."""
+"""Operators that set up a shot. Each is thin: it calls one function, and its errors become a report."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _add(
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
     added = character_setup.add_props(scene, props) if props else []
     if added:
-        reports.append(("INFO", "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)))
+        reports.append(("INFO", "Added " + ", ".join(f"'{entry.name}' of {entry.mass:g} kg" for entry in added)))
     for obj in props:
         if changing := shape_findings([obj]):
             reports.append(("WARNING", changing[0].text))
@@ -106,7 +106,7 @@ class SOFTGROUND_OT_use_as_ground(Reading):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a mesh is selected that may be the ground."""
+        """Return whether a mesh is selected that may be the ground."""
         if not super().poll(context):
             return False
         cls.poll_message_set("Select the mesh to walk on, not a character")
@@ -123,7 +123,7 @@ def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.J
     """Take a mesh as the ground, and read the shot for its prediction."""
     ground_checks.check_usable(chosen)
     options, before = scene.softground, scene.softground.ground
-    kept = settings.name_of(before) if before else None
+    name = settings.name_of(before) if before else None
     stays = False
     try:
         options.ground = chosen
@@ -134,7 +134,7 @@ def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.J
         stays = True
     finally:
         if not stays:
-            options.ground = settings.find(kept) if kept else None
+            options.ground = settings.find(name) if name else None
     return reports
 
 
@@ -188,7 +188,9 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
         return None
     characters = settings.options_of(context).characters
     above = frame_ranges.ancestors(obj)
-    belongs = any(one.armature in above or any(sole.object == obj for sole in one.soles) for one in characters)
+    belongs = any(
+        character.armature in above or any(sole.object == obj for sole in character.soles) for character in characters
+    )
     return None if belongs else obj
 
 
@@ -236,7 +238,7 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is a ground."""
+        """Return whether there is a ground."""
         cls.poll_message_set("Choose a ground first, or bake one")
         return settings.exists(settings.options_of(context).ground)
 
@@ -262,7 +264,7 @@ class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Whether the file on disk is the one that is open."""
+        """Return whether the file on disk is the one that is open."""
         if not bpy.data.filepath:
             cls.poll_message_set("Save the file first: the command bakes it from there")
             return False

@@ -74,12 +74,12 @@ def _viewport(area: Any) -> Any:
 
 def _last_prints(scene: bpy.types.Scene) -> list[BakedStep]:
     """The last step that is in the ground at the scene's frame, and those next to it."""
-    there = [step for step in baked_steps.of(scene) if step.left and step.there_from <= scene.frame_current]
-    if not there:
+    visible = [step for step in baked_steps.of(scene) if step.left and step.there_from <= scene.frame_current]
+    if not visible:
         return []
-    last = max(there, key=lambda step: step.there_from)
+    last = max(visible, key=lambda step: step.there_from)
     at = _middle(last)
-    return sorted(there, key=lambda step: float(np.linalg.norm(_middle(step) - at)))[:SHOWN]
+    return sorted(visible, key=lambda step: float(np.linalg.norm(_middle(step) - at)))[:SHOWN]
 
 
 def _middle(step: BakedStep) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character with an armature is chosen."""
+        """Return whether a character with an armature is chosen."""
         cls.poll_message_set("Choose a character with an armature first")
         character = active_character(settings.options_of(context))
         return bool(character and settings.exists(character.armature))
@@ -72,7 +72,7 @@ class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether one is chosen."""
+        """Return whether one is chosen."""
         cls.poll_message_set("Select a foot lock in the list first")
         return active_hold(active_character(settings.options_of(context))) is not None
 

@@ -129,7 +129,7 @@ class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
 class _OfCharacter(AdvancedPanel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen."""
+        """Return whether a character is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and is_set_up(character))
 
@@ -171,7 +171,7 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character with an armature is chosen."""
+        """Return whether a character with an armature is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and character.armature)
 

@@ -26,8 +26,8 @@ def read(preset: Path) -> bpy.types.ImagePreview | None:
             if not picture.is_file():
                 return None
             state.pictures.load(key, str(picture), "IMAGE")
-    found: bpy.types.ImagePreview | None = state.pictures.get(key)
-    return found
+    preview: bpy.types.ImagePreview | None = state.pictures.get(key)
+    return preview
 
 
 def unregister() -> None:

@@ -25,13 +25,13 @@ from . import preset_icons
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
     """The presets of a folder by name, and what is wrong with the files that are none."""
-    found, broken = [], []
+    loaded, broken = [], []
     for path in sorted(folder.glob("*.json")):
         try:
-            found.append((path, _loaded(path)))
+            loaded.append((path, _loaded(path)))
         except InputError as error:
             broken.append(str(error))
-    return sorted(found, key=lambda entry: entry[1].name.casefold()), broken
+    return sorted(loaded, key=lambda entry: entry[1].name.casefold()), broken
 
 
 def title_of_ground(options: Any) -> str:
@@ -74,12 +74,12 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
         paths = {preset: path for path, preset in ours}
         for section, title in presets.SECTIONS.items():
             layout.label(text=title)
-            for preset in presets.soft_to_firm(one for one in paths if one.section == section):
+            for preset in presets.soft_to_firm(built_in for built_in in paths if built_in.section == section):
                 _entry(layout, paths[preset], preset, translate=True)
-        found, broken = listed(user_folder())
-        if found or broken:
+        loaded, broken = listed(user_folder())
+        if loaded or broken:
             layout.separator()
-        for path, preset in found:
+        for path, preset in loaded:
             _entry(layout, path, preset, translate=False)
         for message in broken:
             layout.label(text=message, icon="ERROR", translate=False)
@@ -183,7 +183,7 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the chosen preset is one of the user's."""
+        """Return whether the chosen preset is one of the user's."""
         cls.poll_message_set("Built-in presets cannot be deleted; choose one of your own")
         return _own(context) is not None
 

@@ -86,7 +86,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a bake has told the speed."""
+        """Return whether a bake has told the speed."""
         cls.poll_message_set("Bake with Sink Feet or Grounding on first: the bake suggests a speed")
         character = active_character(settings.options_of(context))
         return bool(character and character.armature and has_layer(character.armature))
@@ -110,7 +110,7 @@ class _RemoveLayer(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if a character has such a layer and no job runs."""
         characters = settings.options_of(context).characters
-        if not any(one.armature and has_layer(one.armature, cls.kinds[0]) for one in characters):
+        if not any(character.armature and has_layer(character.armature, cls.kinds[0]) for character in characters):
             cls.poll_message_set("No character has this layer")
             return False
         return not session.current().is_baking
@@ -157,7 +157,7 @@ class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen."""
+        """Return whether a character is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and character.armature)
 

@@ -1,1 +1,1 @@
-"""What plays a bake without the add-on: keys, node groups and weather on a mesh."""
+"""Playback of a bake without the add-on: keys, node groups and weather on a mesh."""

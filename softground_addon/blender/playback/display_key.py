@@ -19,7 +19,7 @@ MOST_VERTICES = 250_000
 
 
 def is_dense(ground: bpy.types.Object) -> bool:
-    """Whether shape keys would make a ground play slower."""
+    """Return whether shape keys would make a ground play slower."""
     return len(ground.data.vertices) > MOST_VERTICES
 
 

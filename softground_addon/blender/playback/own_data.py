@@ -1,4 +1,4 @@
-"""Which attributes and properties of a mesh a bake has made: a user may have data of the same names."""
+"""Marks on the attributes and properties of a mesh that a bake has made: a user may have data of the same names."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def made(mesh: bpy.types.Mesh) -> set[str]:
 
 
 def has_made(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
+    """Return whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
     return name in _noted(mesh) and name in mesh.attributes
 
 
@@ -40,22 +40,22 @@ def _noted(mesh: bpy.types.Mesh) -> Sequence[str]:
 
 
 def users_own(ground: bpy.types.Object) -> list[str]:
-    """What of a ground a bake would need for itself, and the user has made."""
+    """Names on a ground that a bake would need for itself, and the user has taken."""
     mesh = cast("bpy.types.Mesh", ground.data)
     ours = made(mesh)
-    there = {*mesh.attributes.keys(), *ground.vertex_groups.keys()}  # which may not be called alike
-    attributes = [name for name in ATTRIBUTES if name in there and name not in ours]
+    present = {*mesh.attributes.keys(), *ground.vertex_groups.keys()}  # which may not be called alike
+    attributes = [name for name in ATTRIBUTES if name in present and name not in ours]
     return attributes if ours else [*attributes, *(name for name in PROPERTIES if name in mesh.keys())]  # noqa: SIM118
 
 
 def attribute(mesh: bpy.types.Mesh, name: str, kind: str) -> Any:
     """A point attribute, new unless there is one of that kind; the one that the user has active stays so."""
     ours = made(mesh)
-    there = mesh.attributes.get(name)
-    if there and (there.domain, there.data_type) == ("POINT", kind):
-        return there
-    if there:
-        mesh.attributes.remove(there)
+    existing = mesh.attributes.get(name)
+    if existing and (existing.domain, existing.data_type) == ("POINT", kind):
+        return existing
+    if existing:
+        mesh.attributes.remove(existing)
     active = mesh.attributes.active_index
     mesh.attributes.new(name, cast("Any", kind), "POINT")
     mesh.attributes.active_index = active

@@ -146,7 +146,9 @@ def _stop(obj: bpy.types.Object) -> None:
 
 def remove_unused() -> None:
     """Remove what nobody plays any more, also of a modifier that the user has deleted."""
-    for group in [one for one in bpy.data.node_groups if nodes.is_playback(one) and not (one.users or one.library)]:
+    for group in [
+        item for item in bpy.data.node_groups if nodes.is_playback(item) and not (item.users or item.library)
+    ]:
         _remove_group(group)
 
 
@@ -164,7 +166,7 @@ def _remove_table(table: bpy.types.Object) -> None:
 
 
 def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
-    """Whether the playback moves each vertex, (V,); None where there is none."""
+    """Return whether the playback moves each vertex, (V,); None where there is none."""
     attribute: Any = mesh.attributes.get(nodes.MOVED)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "BOOLEAN"):
         return None

@@ -108,7 +108,7 @@ def build(
 
 
 def is_playback(tree: bpy.types.NodeTree) -> bool:
-    """Whether a node group is one that `build` made; before it was marked, only its name told."""
+    """Return whether a node group is one that `build` made; before it was marked, only its name told."""
     return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
 
 
@@ -116,13 +116,13 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     """The object whose splines a group samples."""
     for node in tree.nodes:
         if node.bl_idname == "GeometryNodeObjectInfo":
-            found: bpy.types.Object | None = node.inputs["Object"].default_value
-            return found
+            table: bpy.types.Object | None = node.inputs["Object"].default_value
+            return table
     return None
 
 
 class _KeyframeTables:
-    """What the keyframe_tables of vertices say at a place along their splines."""
+    """Values of the keyframe_tables of vertices at a place along their splines."""
 
     def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
         info = graph.node("GeometryNodeObjectInfo")

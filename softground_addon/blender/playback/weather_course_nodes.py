@@ -1,4 +1,4 @@
-"""What weather has done from any moment to now, as nodes: sums over time, on points of their own that are its rows.
+"""Effect of weather from any moment to now, as nodes: sums over time, on points of their own that are its rows.
 
 Rates are those of each part; within it every integral but that over the settling of its own layer is exact. A slider's
 value is that of the group's input, or of a curve if it is keyed, for each part. Rows begin with the moments at which
@@ -63,7 +63,7 @@ less than nothing by the share of a print that is blown full; excess at the *low
 
 
 def field_of(name: str) -> str:
-    """What `core.weather.weather_course.Weather` calls an input."""
+    """Name in `core.weather.weather_course.Weather` of an input."""
     return name.lower().replace(" ", "_")
 
 
@@ -83,7 +83,7 @@ def switch_of(name: str) -> str:
 
 
 class CourseNodes:
-    """What has happened since the first frame, and since the moments of vertices.
+    """Sums of weather since the first frame, and since the moments of vertices.
 
     What only a slider that is at zero would ask for is not worked out, unless any is keyed. `acts` tells by the names
     of sliders what may be above 0: warmth for *Temperature*. `around` has by the names of `KEPT` what has happened
@@ -136,12 +136,12 @@ class CourseNodes:
         self._through = (part * (1.0 / PARTS)).at_most(1.0)
         rates = {name: self._rate(name, said[name]) for name in SUMMED}
         self._density = w.new_snow_density(rates["Temperature"]).where(self.acts["Snowfall"])
-        kept = self._sum(*self._amounts(rates, past * rates["Time Scale"] * (1.0 / span.frame_rate)))
+        summed = self._sum(*self._amounts(rates, past * rates["Time Scale"] * (1.0 / span.frame_rate)))
         off, worked_out = (differs + ages.above(last)).socket, self.rows
         tabled = self._tabled(table, ages, span)
         self.rows = graph.choose("GEOMETRY", off, self.rows, worked_out)
         self._vectors = {
-            name: graph.choose("VECTOR", off, *two) for name, *two in zip(KEPT, tabled, kept, strict=False)
+            name: graph.choose("VECTOR", off, *two) for name, *two in zip(KEPT, tabled, summed, strict=False)
         }
         look, loss, *_ = KEPT
         self.aged = self._named(lambda vector: vector, look, loss)
@@ -161,7 +161,7 @@ class CourseNodes:
         return differs
 
     def _tabled(self, table: Any, ages: Number, span: Span) -> list[Any]:
-        """What the rows keep, from a table of ages; `ages` have gone by since the first frame."""
+        """Values that the rows keep, from a table of ages; `ages` have gone by since the first frame."""
         graph = self.graph
         graph.next_row()
         geometry = graph.object_geometry(table, TABLE)
@@ -224,7 +224,7 @@ class CourseNodes:
         return graph.number(chosen)
 
     def _amounts(self, rates: Mapping[str, Number], time: Number) -> list[Any]:
-        """What each row has of what falls and goes, as vectors that the rows keep.
+        """Amounts that fall and go in each row, as vectors that the rows keep.
 
         The balance of snow, its settling, and what dries; rain, water of snow that melts, and time of rain; time, and
         by how much it spreads and fills prints.
@@ -248,14 +248,14 @@ class CourseNodes:
         return self._keep(*(graph.number(graph.scaled(self._pack(*three), time.socket)) for three in each))
 
     def _sum(self, balance: Any, falling: Any, acting: Any) -> list[Any]:
-        """What has happened from the beginning of each row to now, as vectors that the rows keep: see `_amounts`."""
+        """Sums from the beginning of each row to now, as vectors that the rows keep: see `_amounts`."""
         graph, matter = self.graph, self._matter
         snow, warmth, rain, drying = (self.acts[name] for name in ("Snowfall", "Temperature", "Rain", "Drying"))
         _, settling, _ = graph.parts(balance)
         rained, *_ = graph.parts(falling)
         time, spread, filling = graph.parts(acting)
 
-        sums, fallen = (graph.accumulated(one, "FLOAT_VECTOR") for one in (balance, falling))
+        sums, fallen = (graph.accumulated(vector, "FLOAT_VECTOR") for vector in (balance, falling))
         lowest, following = self._lowest(sums, warmth * snow + drying * (rain + warmth))
         reserve_now, _, water_now = graph.parts(sums.outputs["Total"])
         reserve, *_ = graph.parts(sums.outputs["Trailing"])
@@ -293,12 +293,12 @@ class CourseNodes:
 
     def _pack(self, *numbers: Number | float) -> Any:
         """A vector of up to three numbers."""
-        return self.graph.combined(*(one.socket if isinstance(one, Number) else one for one in numbers))
+        return self.graph.combined(*(number.socket if isinstance(number, Number) else number for number in numbers))
 
     def _keep(self, *vectors: Number) -> list[Any]:
         """Vectors as the rows keep them, all worked out together."""
-        self.rows, kept = self.graph.captured(self.rows, *vectors, kind="VECTOR")
-        return [vector.socket for vector in kept]
+        self.rows, captured = self.graph.captured(self.rows, *vectors, kind="VECTOR")
+        return [vector.socket for vector in captured]
 
     def _depth(self, left: Number, settling: Number, since: Number) -> Number:
         """Depth of the snow of each row [kg/m²] that settles within it, and from its end on."""
@@ -319,20 +319,20 @@ class CourseNodes:
         """The least of each sum from a row on, and from the next one on; 0 is `turns` if none ever turns back."""
         graph, now = self.graph, sums.outputs["Total"]
         at_an_end = [graph.vector("MINIMUM", sums.outputs[name], now) for name in ("Trailing", "Leading")]
-        kept = graph.attribute(LOWEST, "FLOAT_VECTOR")
+        lowest = graph.attribute(LOWEST, "FLOAT_VECTOR")
 
         def ahead(rows: Any, count: Number) -> Any:
-            return graph.at_index(rows, kept, (self._index + count).socket)
+            return graph.at_index(rows, lowest, (self._index + count).socket)
 
         def doubled(rows: Any, count: Number) -> tuple[Any, Number]:
             """From the least of so many rows from each on to that of twice as many."""
-            lower = graph.vector("MINIMUM", kept, ahead(rows, count))
+            lower = graph.vector("MINIMUM", lowest, ahead(rows, count))
             return graph.store(rows, LOWEST, lower, True, "FLOAT_VECTOR"), count + count
 
         first = graph.store(self.rows, LOWEST, at_an_end[0], True, "FLOAT_VECTOR")
         turning = graph.repeated(ROWS.bit_length(), first, 1.0, doubled)
         self.rows = graph.choose("GEOMETRY", turns.socket, self.rows, turning)
-        turned = [kept, ahead(turning, graph.number(1.0))]
+        turned = [lowest, ahead(turning, graph.number(1.0))]
         return [graph.choose("VECTOR", turns.socket, *two) for two in zip(at_an_end, turned, strict=True)]
 
     def _to_now(self, *parts: Number) -> list[Number]:

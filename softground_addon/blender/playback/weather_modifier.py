@@ -66,7 +66,7 @@ def remove(ground: bpy.types.Object) -> None:
 
 def remove_unused() -> None:
     """Remove the groups that no modifier has any more."""
-    for group in [one for one in bpy.data.node_groups if nodes.is_weather(one) and not (one.users or one.library)]:
+    for group in [item for item in bpy.data.node_groups if nodes.is_weather(item) and not (item.users or item.library)]:
         inner = nodes.within(group)
         bpy.data.node_groups.remove(group)
         if inner and not inner.users:

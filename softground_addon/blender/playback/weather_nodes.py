@@ -131,7 +131,7 @@ def _add_sockets(tree: Any) -> None:
 
 
 def is_weather(tree: bpy.types.NodeTree) -> bool:
-    """Whether a node group is one that `new` made."""
+    """Return whether a node group is one that `new` made."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
@@ -176,9 +176,9 @@ def build(
     if inner is None:
         inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
         _add_sockets(inner)
-    there = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
+    existing = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
     asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
-    tables = {name: there[name] or weather_table.new() for name in asked}
+    tables = {name: existing[name] or weather_table.new() for name in asked}
     weather_table.describe(inner, matter, span, soaking)
     fill = partial(
         _fill,
@@ -192,7 +192,7 @@ def build(
         tables=tables,
     )
     node_graph.build(inner, fill)
-    weather_table.remove_unused(there.values())
+    weather_table.remove_unused(existing.values())
     node_graph.build(tree, partial(_hold, inner=inner))
 
 
@@ -233,7 +233,7 @@ def _fill(
 
 
 class _Vertices:
-    """What the weather makes of the vertices.
+    """Vertices as the weather makes them.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ class _Vertices:
         self._share = _shares(graph, course.aged["variance"])
         _, wider, widest = graph.parts(self._share)
         self._inside = graph.combined(
-            *(one.socket for one in (course.begun, wider * course.begun, widest * course.begun))
+            *(blur.socket for blur in (course.begun, wider * course.begun, widest * course.begun))
         )
         self._kept = course.aged["filled"] + 1.0
         self._trodden = graph.attribute(TRODDEN, "FLOAT_VECTOR")
@@ -344,7 +344,7 @@ class _Vertices:
         return self._with(geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
 
     def _rounded(self) -> Number:
-        """What edges that are lost change the height by [m]."""
+        """Change of height by edges that are lost [m]."""
         return self._dot(self._blur, self._not_full(self._share), self._moment)
 
     def _standing(self, table: Number, relief: Number) -> Number:
@@ -363,7 +363,7 @@ class _Vertices:
         excess = low + (high - low) * course.between(left)
         share = (excess / capacity).within_one()
         root = share.root()
-        powers = graph.combined(*(one.socket for one in (root, share, share * root)))
+        powers = graph.combined(*(power.socket for power in (root, share, share * root)))
         brim = graph.number(graph.dot(rise, (1.0,) * POWERS))
         risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
         level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
@@ -400,7 +400,7 @@ class _Vertices:
         return self._graph.number(self._graph.at_index(moments, value.socket, moment, "FLOAT"))
 
     def _relief(self) -> Number:
-        """How high a vertex is over its place at rest [m]."""
+        """Height of a vertex over its place at rest [m]."""
         graph, up = self._graph, self._up
         position = graph.node("GeometryNodeInputPosition").outputs["Position"]
         moved = graph.vector("SUBTRACT", position, graph.attribute(REST, "FLOAT_VECTOR"))

@@ -1,4 +1,4 @@
-"""What weather that does not change has done after each age: a table in no scene, which nodes look up."""
+"""Effect of steady weather after each age: a table in no scene, which nodes look up."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def follow(tree: Any, values: Mapping[str, float], frames: float) -> bool:
 
 
 def _columns(values: Mapping[str, float], ground: Mapping[str, Any], ages: int) -> dict[str, NDArray[np.float64]]:
-    """What weather has done by sliders at these values; `ground` is of `describe`."""
+    """Effect of weather by sliders at these values; `ground` is of `describe`."""
     about = ground["matter"]
     soaking = about["soaking"]
     matter = Matter(**about | {"soaking": Soaking(**soaking) if soaking else None})

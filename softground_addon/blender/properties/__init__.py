@@ -1,4 +1,4 @@
-"""What the user sets: `scene.softground`, saved with the .blend. Lengths are metres whatever the scene's units."""
+"""Settings of the user: `scene.softground`, saved with the .blend. Lengths are metres whatever the scene's units."""
 
 from __future__ import annotations
 

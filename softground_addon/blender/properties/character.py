@@ -1,4 +1,4 @@
-"""What the user sets of characters: what prints, how heavy it is, where its joints are."""
+"""Settings of characters: what prints, how heavy it is, where its joints are."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class SoftGroundSole(bpy.types.PropertyGroup):
 
 
 class SoftGroundHold(bpy.types.PropertyGroup):
-    """How Clean Feet holds one contact; see `core.response.foot_holds`."""
+    """Hold of Clean Feet on one contact; see `core.response.foot_holds`."""
 
     foot: StringProperty(name="Foot", description="Foot whose contact this is")
     frame: IntProperty(name="Frame", description="Any frame in which the foot is planted")

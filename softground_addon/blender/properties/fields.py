@@ -1,4 +1,4 @@
-"""What property groups share."""
+"""Fields that property groups share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bpy.props import FloatProperty
 
 
 def is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
-    """Whether an object can be chosen where a mesh is asked for."""
+    """Return whether an object can be chosen where a mesh is asked for."""
     return candidate.type == "MESH"
 
 

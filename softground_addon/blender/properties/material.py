@@ -1,4 +1,4 @@
-"""What the user sets of the ground's material. Lengths are metres whatever the scene's units."""
+"""Settings of the ground's material. Lengths are metres whatever the scene's units."""
 
 from __future__ import annotations
 
@@ -231,11 +231,15 @@ def by_feel(
 
 
 def _paintable(painted: SoftGroundPainted, _context: bpy.types.Context, _typed: str) -> list[str]:
-    """What the scene's ground could be painted with."""
+    """Vertex groups that the scene's ground could be painted with."""
     ground = cast("Any", painted.id_data).softground.ground
     if ground is None:
         return []
-    floats = {one.name for one in ground.data.attributes if (one.domain, one.data_type) == ("POINT", "FLOAT")}
+    floats = {
+        attribute.name
+        for attribute in ground.data.attributes
+        if (attribute.domain, attribute.data_type) == ("POINT", "FLOAT")
+    }
     return [*ground.vertex_groups.keys(), *sorted(name for name in floats if not name.startswith("softground_"))]
 
 

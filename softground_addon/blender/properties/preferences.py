@@ -1,4 +1,4 @@
-"""What the user sets once for all files, in Blender's own preferences."""
+"""Settings for all files, in Blender's own preferences."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _names(_preferences: bpy.types.AddonPreferences, _context: bpy.types.Context
 
 
 class SoftGroundPreferences(bpy.types.AddonPreferences):
-    """What new scenes start with."""
+    """Preset that new scenes start with."""
 
     bl_idname = ADD_ON
 

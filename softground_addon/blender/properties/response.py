@@ -1,4 +1,4 @@
-"""What the user sets of how characters respond to the ground."""
+"""Settings of how characters respond to the ground."""
 
 from __future__ import annotations
 

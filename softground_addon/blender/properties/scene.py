@@ -1,4 +1,4 @@
-"""What the user sets of a scene: `scene.softground`, saved with the .blend."""
+"""Settings of a scene: `scene.softground`, saved with the .blend."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def look_again() -> None:
 
 
 def is_empty() -> bool:
-    """Whether no shot is known."""
+    """Return whether no shot is known."""
     return not state.analyses
 
 
@@ -257,7 +257,7 @@ def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
     """What the loads depend on, and the contacts: whatever acts on the prints but what a prediction is asked about."""
-    landing = any(one.force_model == "IMPULSE" or one.armature is None for one in wanted.characters)
+    landing = any(character.force_model == "IMPULSE" or character.armature is None for character in wanted.characters)
     return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
 
 

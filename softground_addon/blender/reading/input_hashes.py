@@ -109,15 +109,15 @@ def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
 def of_place(objects: Iterable[bpy.types.Object]) -> str:
     """Where objects stand in their parents, but for what their own animation decides."""
     values = []
-    for one in objects:
-        animated = animated_paths(one)
+    for obj in objects:
+        animated = animated_paths(obj)
         values += [
             value
             for channel in _CHANNELS
-            for index, value in enumerate(getattr(one, channel))
+            for index, value in enumerate(getattr(obj, channel))
             if (channel, index) not in animated
         ]
-        values += np.array(one.matrix_parent_inverse).ravel().tolist()
+        values += np.array(obj.matrix_parent_inverse).ravel().tolist()
     return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
 
 
@@ -126,16 +126,16 @@ def of_keys(obj: bpy.types.Object | bpy.types.Key) -> str:
     animation = obj.animation_data
     if animation is None:
         return ""
-    found = set()
+    hashes = set()
     if animation.action:
-        found.add(_of_action(animation.action, slot_of(animation)))
+        hashes.add(_of_action(animation.action, slot_of(animation)))
     for _, strip in _playing_strips(animation):
         if strip.action is None:
             continue
         influence = None if strip.use_animated_influence else strip.influence
         placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, influence)
-        found.add(f"{_of_action(strip.action, slot_of(strip))}@{placed}")
-    return " ".join(sorted(found))
+        hashes.add(f"{_of_action(strip.action, slot_of(strip))}@{placed}")
+    return " ".join(sorted(hashes))
 
 
 def of_animation(obj: bpy.types.Object, known: Known) -> str:
@@ -144,7 +144,7 @@ def of_animation(obj: bpy.types.Object, known: Known) -> str:
     Of data-blocks that it follows, `known` has what they hold, as far as it was looked at; they are added.
     """
     animated = animated_paths_of(obj)
-    told: list[str] = [obj.rotation_mode]
+    parts: list[str] = [obj.rotation_mode]
     animation = obj.animation_data
     if animation is not None:
         curves: set[str] = set()
@@ -153,19 +153,19 @@ def of_animation(obj: bpy.types.Object, known: Known) -> str:
         for track, strip in _playing_strips(animation):
             if strip.action:
                 curves.update(_of_curves(action_curves(strip.action, slot_of(strip))))
-            told += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
-        told += sorted(curves)
+            parts += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
+        parts += sorted(curves)
         for driver in animation.drivers:
-            told += _of_driver(driver, known)
+            parts += _of_driver(driver, known)
     for owner in (obj, *(obj.pose.bones if obj.pose else ())):
         for constraint in owner.constraints:
             if not is_response(constraint):
-                told += of_settings(constraint, animated, known)
+                parts += of_settings(constraint, animated, known)
     if obj.rigid_body is not None:
-        told += of_settings(obj.rigid_body)
+        parts += of_settings(obj.rigid_body)
     if obj.pose is not None:
-        told += _of_bones(obj)
-    return joined(told)
+        parts += _of_bones(obj)
+    return joined(parts)
 
 
 def of_settings(owner: Any, animated: Collection[str] = (), known: Known | None = None) -> Iterator[str]:
@@ -217,14 +217,14 @@ def _of_block(block: bpy.types.ID, known: Known) -> str:
     if block not in known:
         known[block] = ""  # groups may hold each other
         if isinstance(block, bpy.types.Object):
-            told = [of_place([block]), of_keys(block)]
+            parts = [of_place([block]), of_keys(block)]
         elif isinstance(block, bpy.types.Collection):
-            told = sorted(_of_block(obj, known) for obj in block.all_objects)
+            parts = sorted(_of_block(obj, known) for obj in block.all_objects)
         elif isinstance(block, bpy.types.NodeTree):
-            told = [*_of_nodes(block, known)]
+            parts = [*_of_nodes(block, known)]
         else:
-            told = [block.bl_rna.identifier, bpy.path.basename(getattr(block, "filepath", ""))]
-        known[block] = joined(told)
+            parts = [block.bl_rna.identifier, bpy.path.basename(getattr(block, "filepath", ""))]
+        known[block] = joined(parts)
     return known[block]
 
 
@@ -262,20 +262,20 @@ def _of_action(action: bpy.types.Action, slot: Any) -> str:
 def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
     """How curves run between and beyond their keys."""
     for curve in curves:
-        told = [curve.data_path, str(curve.array_index), curve.extrapolation]
+        parts = [curve.data_path, str(curve.array_index), curve.extrapolation]
         for part in _KEY_SHAPE:
             values = np.empty(len(curve.keyframe_points), dtype=np.float32)
             curve.keyframe_points.foreach_get(part, values)
-            told.append(f"{zlib.crc32(values.data):08x}")
+            parts.append(f"{zlib.crc32(values.data):08x}")
         for modifier in curve.modifiers:
-            told += of_settings(modifier)
-        yield joined(told)
+            parts += of_settings(modifier)
+        yield joined(parts)
 
 
 def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
     """How a strip plays its action; by its own curves where these decide."""
-    own = {f"{_path(strip)}.{curve.data_path}" for curve in strip.fcurves}
-    yield from of_settings(strip, own)
+    animated = {f"{_path(strip)}.{curve.data_path}" for curve in strip.fcurves}
+    yield from of_settings(strip, animated)
     yield from _of_curves(strip.fcurves)
     for curve in strip.fcurves:
         yield from (f"{key.co[0]:.6g} {key.co[1]:.6g}" for key in curve.keyframe_points)

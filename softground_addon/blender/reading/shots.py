@@ -103,10 +103,10 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
             "Character."
         )
     ground = settings.found(wanted.ground) if wanted.ground else None
-    for one in wanted.characters:
-        if one.armature:
-            require_armature(settings.found(one.armature))
-        check_props(scene, one.name, one.soles, ground)
+    for printing in wanted.characters:
+        if printing.armature:
+            require_armature(settings.found(printing.armature))
+        check_props(scene, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
@@ -176,21 +176,21 @@ def sample_characters(
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
     motions, rigs = [], []
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
-    for number, one in enumerate(wanted.characters):
-        mapping, poses = RigMapping(one.joints, one.soles, "settings"), None
-        if one.armature:
-            armature = settings.found(one.armature)
+    for number, character in enumerate(wanted.characters):
+        mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
+        if character.armature:
+            armature = settings.found(character.armature)
             if wanted.response:
-                check_rig(scene, armature, mapping, one.mass_kg)
+                check_rig(scene, armature, mapping, character.mass_kg)
                 controls = controls_of(scene, armature, mapping)
                 poses = RigPoses([control.bone for control in controls])
-            grown = size_of(scene, armature) / one.size_m if one.size_m else 1.0
+            grown = size_of(scene, armature) / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,
                 armature,
                 mapping,
-                mass=one.mass_kg,
-                skin_mass=one.skin_mass_kg * grown**3,
+                mass=character.mass_kg,
+                skin_mass=character.skin_mass_kg * grown**3,
                 frames=frames,
                 poses=poses,
                 below=below,
@@ -199,7 +199,7 @@ def sample_characters(
             )
         else:
             job = sample_prop(
-                scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted, findings=findings
+                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=wanted, findings=findings
             )
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
         if poses:

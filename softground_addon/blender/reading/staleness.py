@@ -127,13 +127,13 @@ def _changes(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[tuple[
 def _in_order(hashes: Mapping[str, str]) -> dict[tuple[str, str], tuple[str, str]]:
     """Hashes with the names that they are under: by kind, and by place among those of the kind, as movers may have been
     renamed; else by name."""
-    found: dict[tuple[str, str], tuple[str, str]] = {}
+    ordered: dict[tuple[str, str], tuple[str, str]] = {}
     count = Counter[str]()
     for key, value in hashes.items():
         kind, _, name = key.partition(":")
-        found[kind, str(count[kind]) if kind in _OF_MOVERS else name] = name, value
+        ordered[kind, str(count[kind]) if kind in _OF_MOVERS else name] = name, value
         count[kind] += 1
-    return found
+    return ordered
 
 
 def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
@@ -146,12 +146,12 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
 def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
     ground = settings.found(wanted.ground) if wanted.ground else None
-    movers = [obj for one in wanted.characters for obj in movers_of(one)]
+    movers = [obj for character in wanted.characters for obj in movers_of(character)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
-        **{f"{BODY}:{one.name}": _of_body(scene, one) for one in wanted.characters},
+        **{f"{BODY}:{character.name}": _of_body(scene, character) for character in wanted.characters},
     }
 
 
@@ -180,9 +180,9 @@ def of_ground(wanted: BakeSettings) -> dict[str, str]:
 def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
     """A hash of each setting; what has only been renamed is the same."""
     nameless = [
-        {**one, "name": "", "armature": bool(one["armature"])}
-        | {"soles": [{**sole, "object": bool(sole["object"])} for sole in one["soles"]]}
-        for one in inputs["characters"]
+        {**character, "name": "", "armature": bool(character["armature"])}
+        | {"soles": [{**sole, "object": bool(sole["object"])} for sole in character["soles"]]}
+        for character in inputs["characters"]
     ]
     compared = {**inputs, "ground": "", "characters": nameless}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
@@ -214,22 +214,26 @@ def _of_standing(ground: bpy.types.Object) -> str:
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:
     """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, weather never does."""
     played, weather = playback.modifier_of(ground), weather_modifier.modifier_of(ground)
-    return [one.type for one in ground.modifiers if one == played or (one.show_viewport and one != weather)]
+    return [
+        modifier.type
+        for modifier in ground.modifiers
+        if modifier == played or (modifier.show_viewport and modifier != weather)
+    ]
 
 
 def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
     """What the ground's modifiers do, and how its material varies."""
     keyed = input_hashes.animated_paths_of(ground)
-    told = [
+    parts = [
         text for modifier in ground_mesh.users_modifiers(ground) for text in input_hashes.of_settings(modifier, keyed)
     ]
-    told += filter(None, [input_hashes.of_keys(ground)])
+    parts += filter(None, [input_hashes.of_keys(ground)])
     try:
         names = [name for name in painted_ground.names_of(ground, painted) if name]
     except InputError as error:
         return str(error)
-    told += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in names]
-    return input_hashes.joined([*told, input_hashes.of_weights(ground, names)])
+    parts += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in names]
+    return input_hashes.joined([*parts, input_hashes.of_weights(ground, names)])
 
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
@@ -237,19 +241,19 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
     parents = ancestors(mover)
     known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
     # All of these are compared by themselves: here it counts only which is followed.
-    blocks: input_hashes.Known = {one: str(n) for n, one in enumerate((mover, *parents, *([ground] if ground else ())))}
-    told = [input_hashes.of_animation(mover, blocks)]
+    blocks: input_hashes.Known = {obj: str(n) for n, obj in enumerate((mover, *parents, *([ground] if ground else ())))}
+    parts = [input_hashes.of_animation(mover, blocks)]
     waiting = [*parents, *leaders(mover)]
     while waiting:
-        one = waiting.pop()
-        if one in known:
+        obj = waiting.pop()
+        if obj in known:
             continue
-        known.add(one)
-        told += [input_hashes.of_keys(one), input_hashes.of_animation(one, blocks)]
-        if one not in parents:
-            told.append(input_hashes.of_place([one]))
-        waiting += [*([one.parent] if one.parent else []), *leaders(one)]
-    return input_hashes.joined(sorted(told))
+        known.add(obj)
+        parts += [input_hashes.of_keys(obj), input_hashes.of_animation(obj, blocks)]
+        if obj not in parents:
+            parts.append(input_hashes.of_place([obj]))
+        waiting += [*([obj.parent] if obj.parent else []), *leaders(obj)]
+    return input_hashes.joined(sorted(parts))
 
 
 def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
@@ -268,22 +272,22 @@ def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.t
 
 def bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
-    return [obj for one in wanted.characters for obj in (*_worn_by(scene, one), *_things_of(one))]
+    return [obj for character in wanted.characters for obj in (*_worn_by(scene, character), *_things_of(character))]
 
 
 def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
-    told = []
+    parts = []
     for obj in _things_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
-        told.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
-    told += [
+        parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
+    parts += [
         f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
         f"{input_hashes.of_shapes(worn)}"
         for worn in _worn_by(scene, character)
     ]
-    return input_hashes.joined(sorted(told))
+    return input_hashes.joined(sorted(parts))
 
 
 def _of_mesh(obj: bpy.types.Object) -> str:

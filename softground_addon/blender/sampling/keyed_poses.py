@@ -27,7 +27,7 @@ _NO_SIMPLE_CHANNEL = re.compile(r'(.*\.)?rotation_mode|delta_.*|pose\.bones\[[^"
 
 
 def is_moved_by_keys_alone(armature: bpy.types.Object, bones: Iterable[str]) -> bool:
-    """Whether its keys tell all that moves these bones.
+    """Return whether its keys tell all that moves these bones.
 
     Parents, constraints, drivers, strips and animated properties of the armature's data are left to Blender, and so are
     bones that take over a part of their parent's motion only.
@@ -37,8 +37,8 @@ def is_moved_by_keys_alone(armature: bpy.types.Object, bones: Iterable[str]) -> 
         return False
     if animation.drivers or not _plays_its_action_only(animation) or _has_deltas(armature):
         return False
-    constraints = (one for owner in (armature, *armature.pose.bones) for one in owner.constraints)
-    if any(not (one.mute and is_own(one)) for one in constraints):
+    constraints = (constraint for owner in (armature, *armature.pose.bones) for constraint in owner.constraints)
+    if any(not (constraint.mute and is_own(constraint)) for constraint in constraints):
         return False
     if not all(_follows_its_parent(armature.data.bones[name]) for name in with_parents(armature, bones)):
         return False
@@ -50,11 +50,11 @@ def is_moved_by_keys_alone(armature: bpy.types.Object, bones: Iterable[str]) -> 
 
 def with_parents(armature: bpy.types.Object, bones: Iterable[str]) -> list[str]:
     """Names of bones and of all above them, parents first."""
-    found: dict[str, None] = {}
+    names_in_order: dict[str, None] = {}
     for name in bones:
         bone = armature.data.bones[name]
-        found.update(dict.fromkeys([each.name for each in (*reversed(bone.parent_recursive), bone)]))
-    return list(found)
+        names_in_order.update(dict.fromkeys([each.name for each in (*reversed(bone.parent_recursive), bone)]))
+    return list(names_in_order)
 
 
 def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDArray[Any]) -> Array:
@@ -77,12 +77,12 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
         Matrices of the bone in the armature's space [Blender units].
     """
     bone = armature.data.bones[name]
-    own = _transforms(armature.pose.bones[name], path_of_bone(name, ""), times)
+    local = _transforms(armature.pose.bones[name], path_of_bone(name, ""), times)
     if bone.use_connect:
-        own[:, :3, 3] = 0.0
+        local[:, :3, 3] = 0.0
     if bone.parent is None:
-        return np.asarray(np.array(bone.matrix_local) @ own)
-    return np.asarray(parent @ _from_parent(bone) @ own)
+        return np.asarray(np.array(bone.matrix_local) @ local)
+    return np.asarray(parent @ _from_parent(bone) @ local)
 
 
 def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
@@ -91,7 +91,7 @@ def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
 
 
 def _plays_its_action_only(animation: bpy.types.AnimData) -> bool:
-    """Whether no strip of the NLA has a say in what the action does."""
+    """Return whether no strip of the NLA has a say in what the action does."""
     whole = animation.action_blend_type, animation.action_influence, animation.action_extrapolation
     return (
         all(track.mute and not track.is_solo for track in animation.nla_tracks)

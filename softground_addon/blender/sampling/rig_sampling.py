@@ -376,7 +376,7 @@ def sampling_scene(
 
 
 def is_simulated(obj: bpy.types.Object) -> bool:
-    """Whether Blender's rigid bodies move an object, or one that it is parented to."""
+    """Return whether Blender's rigid bodies move an object, or one that it is parented to."""
     node: bpy.types.Object | None = obj
     while node is not None:
         if node.rigid_body and node.rigid_body.type == "ACTIVE":
@@ -482,12 +482,12 @@ def still_there(name: str) -> bpy.types.Scene:
 
 def object_named(name: str) -> bpy.types.Object:
     """Object by its full name, which tells linked ones from local ones."""
-    found = bpy.data.objects.get(name)
-    if found is None or found.name_full != name:
-        found = next((obj for obj in bpy.data.objects if obj.name_full == name), None)
-    if found is None:
+    block = bpy.data.objects.get(name)
+    if block is None or block.name_full != name:
+        block = next((obj for obj in bpy.data.objects if obj.name_full == name), None)
+    if block is None:
         raise InputError(f"Object '{name}' was deleted: choose another one for the character.")
-    return found
+    return block
 
 
 def _let_handlers_act(scene: bpy.types.Scene, frame: int, subframe: float = 0.0) -> None:
@@ -510,7 +510,7 @@ def _check_mass(name: str, mass: float) -> None:
 
 
 def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
-    """Whether a character can be read.
+    """Return whether a character can be read.
 
     Raises
     ------
@@ -545,7 +545,7 @@ def check_bones(armature: bpy.types.Object, mapping: RigMapping) -> None:
 
 
 def is_animated(armature: bpy.types.Object) -> bool:
-    """Whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
+    """Return whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
     obj: bpy.types.Object | None = armature
     while obj is not None:
         animation = obj.animation_data

@@ -183,8 +183,8 @@ def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
     """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
     read, tables = 0, [np.empty((0, 3))]
     while read < len(vertices := _mesh_of(found(name)).vertices):
-        some = enumerate(vertices[read : read + _SLICE], read)
-        entries = [x for index, vertex in some for each in vertex.groups for x in (index, each.group, each.weight)]
+        piece = enumerate(vertices[read : read + _SLICE], read)
+        entries = [x for index, vertex in piece for each in vertex.groups for x in (index, each.group, each.weight)]
         tables.append(np.array(entries, dtype=float).reshape(-1, 3))
         read += _SLICE
         yield

@@ -1,4 +1,4 @@
-"""What the overlay draws, as plain arrays in world space [m]: footfalls, soles, forces and cells."""
+"""Shapes of the overlay, as plain arrays in world space [m]: footfalls, soles, forces and cells."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Outline:
 
     @property
     def middle(self) -> Array:
-        """Where its number goes [m]."""
+        """Place of its number [m]."""
         middle: Array = self.points.mean(axis=0)
         return middle
 
@@ -75,8 +75,8 @@ class Arrow:
 
 
 def footfalls(loads: Sequence[CharacterLoads], terrain: Terrain) -> list[Outline]:
-    """Where soles will stand, in the order of their first contact: each outline as posed under its largest force."""
-    found = []
+    """Outlines of soles to come, in the order of their first contact, each as posed under its largest force."""
+    outlines = []
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             strength = np.linalg.norm(character.forces.forces[:, index], axis=-1)
@@ -85,8 +85,8 @@ def footfalls(loads: Sequence[CharacterLoads], terrain: Terrain) -> list[Outline
                 points = _posed(motion.sole, motion.transforms[hardest])
                 heights = terrain.heights(points[:, 0], points[:, 1])
                 points[:, 2] = np.where(np.isnan(heights), points[:, 2], heights + LIFT)
-                found.append(Outline(points, motion.sole.side, float(character.motion.frames[first])))
-    return sorted(found, key=lambda outline: outline.frame)
+                outlines.append(Outline(points, motion.sole.side, float(character.motion.frames[first])))
+    return sorted(outlines, key=lambda outline: outline.frame)
 
 
 def soles(loads: Sequence[CharacterLoads], frame: float) -> Iterator[Outline]:

@@ -221,12 +221,12 @@ def _viewport(context: bpy.types.Context, event: bpy.types.Event | None) -> tupl
         inside = 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
         if region.type != "WINDOW" and inside:
             return None, None
-    region = next((one for one in area.regions if one.type == "WINDOW"), None) if area else None
+    region = next((item for item in area.regions if item.type == "WINDOW"), None) if area else None
     return (region, area.spaces.active.region_3d) if region else (None, None)
 
 
 def _on_plane(region: Any, view: Any, event: bpy.types.Event, height: float) -> Array | None:
-    """Where the mouse points at on a level plane, (2,) [m]; None where it points past it."""
+    """Place on a level plane that the mouse points at, (2,) [m]; None where it points past it."""
     from bpy_extras import view3d_utils  # noqa: PLC0415
 
     metre = float(bpy.context.scene.unit_settings.scale_length)

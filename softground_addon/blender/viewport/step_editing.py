@@ -42,7 +42,7 @@ class OnSteps(OnBake):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is a bake, and neither another one nor live mode is at work."""
+        """Return whether there is a bake, and neither another one nor live mode is at work."""
         if session.current().is_baking or live.is_on():
             cls.poll_message_set("A bake is running, or live mode is on: wait, or press Keep or Discard first")
             return False
@@ -126,7 +126,7 @@ def copied(
 
 def toggle(name: str) -> None:
     """Choose a step with those that are chosen, or no more."""
-    names = [one for one in session.chosen_steps() if one != name]
+    names = [chosen for chosen in session.chosen_steps() if chosen != name]
     if len(names) == len(session.chosen_steps()):
         names.insert(0, name)
     session.choose_steps(names[0] if names else "", names)
@@ -149,7 +149,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        step = next((one for one in baked_steps.of(scene) if one.name == self.step), None)
+        step = next((item for item in baked_steps.of(scene) if item.name == self.step), None)
         if step is None:
             return {"CANCELLED"}
         if self.extend:
@@ -289,12 +289,12 @@ def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> Mesh
     if sole in steps[0].feet:
         return None
     obj = step_soles.object_of(scene, sole)
-    kept = mesh_soles(baked_ground.edits_of(scene.softground.ground))
-    if obj is None and sole not in kept:
+    soles = mesh_soles(baked_ground.edits_of(scene.softground.ground))
+    if obj is None and sole not in soles:
         feet = ", ".join(sorted(steps[0].feet)) or "none"
         raise InputError(f"The bake has no sole '{sole}': choose one of {feet}, or a mesh object in this scene.")
     if obj is None:
-        return kept[sole]
+        return soles[sole]
     return step_soles.read(obj, scene.softground.ground, scene.unit_settings.scale_length)
 
 

@@ -72,16 +72,16 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     places = yield from _places(ground, footprints, about)
     ground = settings.found(name)
     display_mesh = baked_ground.display_mesh_of(ground)
-    there: Any = weather_modifier.modifier_of(display_mesh)
-    if there:
-        weather_modifier.separate(there)
-    tree = there.node_group if there else nodes.new()
+    existing: Any = weather_modifier.modifier_of(display_mesh)
+    if existing:
+        weather_modifier.separate(existing)
+    tree = existing.node_group if existing else nodes.new()
     try:
         _fit(ground, display_mesh, tree, footprints, about, places)
     except BaseException:
         weather_modifier.remove_unused()
         raise
-    modifier = there or weather_modifier.put(display_mesh, tree)
+    modifier = existing or weather_modifier.put(display_mesh, tree)
     weather_keys.follow(display_mesh)
     if preset:
         set_preset(modifier, preset)
@@ -96,11 +96,11 @@ def values_of(ground: bpy.types.Object) -> dict[str, float]:
 
 def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
     """Fit weather to what a new bake left, with the values that the ground had before it; nothing if it had none."""
-    there = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
-    if there is None and not values:
+    existing = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    if existing is None and not values:
         return
     modifier = add(ground, left)
-    if there is None:
+    if existing is None:
         _set(modifier, values)
 
 
@@ -118,7 +118,7 @@ def _set(modifier: Any, values: Mapping[str, float]) -> None:
 
 def _check_names(display_mesh: bpy.types.Object) -> None:
     mesh = ground_mesh.mesh_of(display_mesh)
-    taken = [one for one in nodes.OF_WEATHER if one in mesh.attributes and one not in own_data.made(mesh)]
+    taken = [name for name in nodes.OF_WEATHER if name in mesh.attributes and name not in own_data.made(mesh)]
     if taken:
         raise InputError(
             f"'{display_mesh.name}' has an attribute '{taken[0]}' of your own: rename it, as weather needs that name."

@@ -72,11 +72,11 @@ def values_of(modifier: Any) -> dict[str, float]:
 
 def rates(modifier: Any, span: Span) -> dict[str, Any]:
     """What acts on prints, as `core.weather.weather_course.Weather` has it: numbers, or means of each part if keyed."""
-    keyed, values, found = _keyed(modifier), values_of(modifier), {}
+    keyed, values, means_by_field = _keyed(modifier), values_of(modifier), {}
     for name, unit in ON_PRINTS.items():
         means = _means(keyed[name], span) if name in keyed else np.float64(typed(values[name]))
-        found[field_of(name)] = (means.astype(np.float64) * unit).tolist()
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
+        means_by_field[field_of(name)] = (means.astype(np.float64) * unit).tolist()
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in means_by_field.items()}
 
 
 def is_keyed(modifier: Any, *names: str) -> bool:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def edited_contact(
-    own: PressingSole, steps: Steps, other: PressingSole, edit: StepEdit, pivot: Array, terrain: Terrain
+    sole: PressingSole, steps: Steps, other: PressingSole, edit: StepEdit, pivot: Array, terrain: Terrain
 ) -> tuple[PressingSole, Steps]:
     """The sole that presses a step now, and what it does.
 
@@ -37,13 +37,13 @@ def edited_contact(
         Middle of the print on the undisturbed ground [m].
     terrain : Terrain
     """
-    steps = swapped(steps, own, other)
+    steps = swapped(steps, sole, other)
     if edit.scale != 1.0:
         other, steps = _scaled_sole(other, edit.scale), _scaled_steps(steps, edit.scale, pivot)
     return other, _placed(steps, edit, pivot, terrain, _length(other))
 
 
-def swapped(steps: Steps, own: PressingSole, other: PressingSole) -> Steps:
+def swapped(steps: Steps, sole: PressingSole, other: PressingSole) -> Steps:
     """The steps of a sole in place of another, middle on middle and toes ahead, under the same force.
 
     Each of its patches moves as that of the sole that made the step does, counted from the toes: a sole in one piece
@@ -55,14 +55,16 @@ def swapped(steps: Steps, own: PressingSole, other: PressingSole) -> Steps:
         What `own` did.
     own, other : PressingSole
     """
-    if other is own:
+    if other is sole:
         return steps
-    (middle, extent), (there, size) = _box(own), _box(other)
+    (middle, extent), (their_middle, size) = _box(sole), _box(other)
     ahead = np.eye(4)
-    ahead[:2, 3] = middle - there
+    ahead[:2, 3] = middle - their_middle
     first = ahead @ inverse(other.flat[0])
-    of_own = np.maximum(np.arange(len(other.flat)) + len(own.flat) - len(other.flat), 0)
-    carried = inverse(own.flat[of_own]) @ own.flat[0] @ first @ other.flat  # (P, 4, 4) in the frames of its own patches
+    of_own = np.maximum(np.arange(len(other.flat)) + len(sole.flat) - len(other.flat), 0)
+    carried = (
+        inverse(sole.flat[of_own]) @ sole.flat[0] @ first @ other.flat
+    )  # (P, 4, 4) in the frames of its own patches
     whole = steps.poses[:, 0]
     centres = np.einsum("nji,nj->ni", whole[:, :3, :3], steps.centres - whole[:, :3, 3])
     centres[:, :2] = middle + (centres[:, :2] - middle) * size / extent
@@ -85,8 +87,8 @@ def _scaled_sole(pressing: PressingSole, scale: float) -> PressingSole:
     sole, flat = pressing.sole, pressing.flat.copy()
     flat[:, :3, 3] *= scale
     patches = tuple(
-        SolePatch(one.heights * scale, one.signed_distance * scale, one.origin * scale, one.spacing * scale)
-        for one in sole.patches
+        SolePatch(patch.heights * scale, patch.signed_distance * scale, patch.origin * scale, patch.spacing * scale)
+        for patch in sole.patches
     )
     prop = replace(sole.prop, vertices=sole.prop.vertices * scale) if sole.prop else None
     larger = replace(sole, patches=patches, landmarks=sole.landmarks * scale, outline=sole.outline * scale, prop=prop)
@@ -130,8 +132,8 @@ def _placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length
     target = pivot + np.array([*edit.move_m, 0.0])
     turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))
     if edit.move_m != (0.0, 0.0):
-        (here, upright_here), (there, upright_there) = (_plane(terrain, place, length) for place in (pivot, target))
-        target[2] = pivot[2] + there - here
+        (here, upright_here), (height, upright_there) = (_plane(terrain, place, length) for place in (pivot, target))
+        target[2] = pivot[2] + height - here
         if (upright_here != upright_there).any():
             turn = rotation(turn_between(upright_here, upright_there)) @ turn
     shift = target - turn @ pivot

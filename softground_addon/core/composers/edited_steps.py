@@ -176,25 +176,25 @@ class EditedSteps:
                 break
             members |= dict.fromkeys(later, UNCHANGED)
         self._layouts = {change: self._layouts[change] for change in members.items() if change in self._layouts}
-        kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
-        windows = [footprint.window for footprint in kept.values() if footprint]
-        window = reduce(Window.union, [*windows, *(self._baked(n).window for n in kept)])
-        return _Group(edits, kept, {n: changed[n] for n in kept}, window.expanded(self._weather_reach))
+        changing = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
+        windows = [footprint.window for footprint in changing.values() if footprint]
+        window = reduce(Window.union, [*windows, *(self._baked(n).window for n in changing)])
+        return _Group(edits, changing, {n: changed[n] for n in changing}, window.expanded(self._weather_reach))
 
     def _start(self, number: int, edit: StepEdit) -> float:
         """The first scene frame at which a step presses, or pressed."""
         return self._baked(number).start_frame + min(0, edit.shift_frames)
 
-    def _meet(self, one: _Group, other: _Group) -> bool:
+    def _meet(self, group: _Group, other: _Group) -> bool:
         """True if steps of one group meet what another one changed."""
-        if other not in one.meets:
-            one.meets[other] = bool(one.prints.keys() & other.prints.keys()) or self._touch(one, other)
-        return one.meets[other]
+        if other not in group.meets:
+            group.meets[other] = bool(group.prints.keys() & other.prints.keys()) or self._touch(group, other)
+        return group.meets[other]
 
-    def _touch(self, one: _Group, other: _Group) -> bool:
+    def _touch(self, first: _Group, other: _Group) -> bool:
         return any(
             self._reads(number, group.prints[number], cells)
-            for group, another in ((one, other), (other, one))
+            for group, another in ((first, other), (other, first))
             for number in group.prints
             for cells in another.changed.values()
         )
@@ -210,10 +210,13 @@ class EditedSteps:
         return [n for n in np.flatnonzero(near).tolist() if self._reads(n, None, cells)]
 
     def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
-        """Whether a step, as it was baked or as it is now, presses some cells."""
+        """Return whether a step, as it was baked or as it is now, presses some cells."""
         prints = (self._before(number), footprint)
         return any(
-            bool(among(cells, pressed).any()) for one in prints if one is not None for pressed in [self._read_by(one)]
+            bool(among(cells, pressed).any())
+            for other_print in prints
+            if other_print is not None
+            for pressed in [self._read_by(other_print)]
         )
 
     def _read_by(self, footprint: Footprint) -> Keys:
@@ -238,9 +241,9 @@ class EditedSteps:
                 of_quantity[window.slices(after.window)] += after.tile(changes)
         differs = (np.abs(difference) > VISIBLE).any(axis=0)
         if self._ground.weathering and not _at_once(before, after):  # of other age, whatever its depth
-            for one in (before, after):
-                if one is not None:
-                    differs[window.slices(one.window)] |= _changed_by(one)
+            for footprint in (before, after):
+                if footprint is not None:
+                    differs[window.slices(footprint.window)] |= _changed_by(footprint)
         return _keys(window, np.flatnonzero(differs))
 
     def _press(self, members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
@@ -253,7 +256,7 @@ class EditedSteps:
         return prints
 
     def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
-        layouts = {n: one.layout for n, one in laid.items()}
+        layouts = {n: item.layout for n, item in laid.items()}
         grid = _grid(self._baked(next(iter(layouts))))
         start = min(layout.first for layout in layouts.values())
         end = max(layout.end for layout in layouts.values())
@@ -261,9 +264,9 @@ class EditedSteps:
         first = grid.number(start)
         solver = GroundSolver(self._ground, HeightField(self._cell_size), self._undisturbed)
         if weathered := solver.weathered:
-            for one in self._footprints:
-                weathered.ended(one.end_frame, one.compressed_m3, one.area_m2)
-        contacts = [OpenContact(one.layout, laid_out=one.imprints) for one in laid.values()]
+            for item in self._footprints:
+                weathered.ended(item.end_frame, item.compressed_m3, item.area_m2)
+        contacts = [OpenContact(item.layout, laid_out=item.imprints) for item in laid.values()]
         number_of = dict(zip(contacts, laid, strict=True))
         prints: dict[int, Footprint | None] = {}
         before = -np.inf
@@ -299,15 +302,15 @@ class EditedSteps:
 
     def _laid_out(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
         """A step where it is pressed now."""
-        kept = footprint.pressed_by
-        if kept is None:
+        baked = footprint.pressed_by
+        if baked is None:
             raise InputError(
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
                 "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again."
             )
-        steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
-        other = sole_of(edit, kept.pressing, self._feet)
-        pressing, steps = edited_contact(kept.pressing, steps, other, edit, footprint.position, self._ground.terrain)
+        steps = _grid(footprint).shifted(baked.steps(footprint.load_frames), edit.shift_frames)
+        other = sole_of(edit, baked.pressing, self._feet)
+        pressing, steps = edited_contact(baked.pressing, steps, other, edit, footprint.position, self._ground.terrain)
         sole, strength = pressing.sole, edit.strength
         layout: ContactLayout
         if sole.prop is not None:
@@ -381,12 +384,12 @@ class _Grid:
 
 
 def _grid(footprint: Footprint) -> _Grid:
-    kept, frames = footprint.pressed_by, footprint.load_frames
-    assert kept is not None
+    baked, frames = footprint.pressed_by, footprint.load_frames
+    assert baked is not None
     per_frame = max(1, round(footprint.frame_step / footprint.load_spacing))
-    begin = frames[0] - kept.first * footprint.frame_step / per_frame
+    begin = frames[0] - baked.first * footprint.frame_step / per_frame
     whole = float(np.rint(begin))
-    timing = Timing(kept.time_step, per_frame, footprint.frame_step)
+    timing = Timing(baked.time_step, per_frame, footprint.frame_step)
     return _Grid(timing, whole if abs(begin - whole) < 1e-3 else float(begin))
 
 
@@ -413,7 +416,7 @@ class _Baked:
     @cached_property
     def _changes(self) -> list[tuple[Array, NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]]:
         both = (self._footprint.compression, self._footprint.rim)
-        return [(one.frames, one.first, one.cells, one.amounts) for one in both]
+        return [(change.frames, change.first, change.cells, change.amounts) for change in both]
 
     def replay(self, solver: GroundSolver, since: float, frame: float) -> None:
         """Change a ground as it did after one recorded frame, up to another."""
@@ -423,7 +426,7 @@ class _Baked:
             solver.state.write(window, solver.state.read(window) + self._sum(during))
         if weathered := solver.weathered:
             weathered.note(*self._known(frame))
-            after, before = (self._footprint.tile(self._pressing, one + 1e-6) for one in (frame, since))
+            after, before = (self._footprint.tile(self._pressing, time + 1e-6) for time in (frame, since))
             weathered.press(window, after - before)
 
     def _known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
@@ -456,18 +459,18 @@ def _near(groups: Sequence[_Group]) -> Iterable[tuple[_Group, _Group]]:
     windows = np.array([group.window for group in groups]).reshape(-1, 4)
     low, high = windows[:, :2], windows[:, :2] + windows[:, 2:]
     near = ((low[:, None] < high) & (low < high[:, None])).all(axis=-1)
-    return ((groups[one], groups[other]) for one, other in np.argwhere(np.triu(near, 1)).tolist())
+    return ((groups[a], groups[other]) for a, other in np.argwhere(np.triu(near, 1)).tolist())
 
 
 def _within(changes: frozenset[Change], edits: Mapping[int, StepEdit]) -> bool:
     return all(edits.get(number) == edit for number, edit in changes)
 
 
-def _at_once(one: Footprint | None, other: Footprint | None) -> bool:
-    """Whether two prints were made at the same time."""
-    if one is None or other is None:
+def _at_once(footprint: Footprint | None, other: Footprint | None) -> bool:
+    """Return whether two prints were made at the same time."""
+    if footprint is None or other is None:
         return False
-    return abs(one.start_frame - other.start_frame) + abs(one.end_frame - other.end_frame) < _SAME_TIME
+    return abs(footprint.start_frame - other.start_frame) + abs(footprint.end_frame - other.end_frame) < _SAME_TIME
 
 
 def _changed_by(footprint: Footprint) -> NDArray[np.bool_]:

@@ -146,23 +146,23 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
         contacts.append(detect_contacts(motion, _terrain(low, slope)))
     floats = [
         offset
-        for motion, found in zip(motions, contacts, strict=True)
-        for sole, offset in zip(motion.soles, found.offset, strict=True)
+        for motion, contact in zip(motions, contacts, strict=True)
+        for sole, offset in zip(motion.soles, contact.offset, strict=True)
         if motion.centre is None and any(sole is foot for foot in _feet(motion))
     ]
     # What skin shows is where it rests; the underside of a foot that was cut from it may lie a little off.
     height = low + (float(np.median(floats)) if floats and not levels else 0.0)
     raster = shortest_length(sole.sole.length for motion in motions for sole in motion.soles) / POINTS_ALONG_SOLE
     footfalls = []
-    for motion, found in zip(motions, contacts, strict=True):
-        for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True):
+    for motion, contact in zip(motions, contacts, strict=True):
+        for sole, touching, offset in zip(motion.soles, contact.touching.T, contact.offset, strict=True):
             yield
             if sole.sole.prop:
                 footfalls.append(_places_under_prop(sole, _terrain(height, slope), raster))
             else:
                 footfalls.append(_places_under(sole, touching, _terrain(low + offset, slope), raster))
     yield
-    missed = [(motion.name, missed_steps(motion, found)) for motion, found in zip(motions, contacts, strict=True)]
+    missed = [(motion.name, missed_steps(motion, contact)) for motion, contact in zip(motions, contacts, strict=True)]
     return GroundPlan(
         *extent(motions),
         _terrain(height, slope),
@@ -220,13 +220,13 @@ def _footholds(motion: CharacterMotion) -> Array:
     """Lowest point of each foot whenever it is seen to bear or rests, (N, 3) [m]; none of limbs, which may rest on
     nothing."""
     limit = REST_SPEED * motion.froude_speed
-    found = [np.zeros((0, 3))]
+    footholds = [np.zeros((0, 3))]
     for sole in (sole for sole in motion.soles if sole.sole.prop is None):
         points = sole.landmark_positions()
         lowest = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
         speed = np.linalg.norm(np.gradient(lowest, motion.time_step, axis=0), axis=-1) if len(lowest) > 1 else 0.0
-        found.append(lowest[speed < limit if sole.bears is None else sole.bears])
-    return np.concatenate(found)
+        footholds.append(lowest[speed < limit if sole.bears is None else sole.bears])
+    return np.concatenate(footholds)
 
 
 def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrain, raster: float) -> Array:
@@ -236,7 +236,7 @@ def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrai
     """
     edge = np.flatnonzero(touching[1:] != touching[:-1])
     poses = np.concatenate([sole.transforms[touching], (sole.transforms[edge] + sole.transforms[edge + 1]) / 2])
-    found: Keys = np.zeros(0, dtype=np.int64)
+    keys: Keys = np.zeros(0, dtype=np.int64)
     for number, patch in enumerate(sole.sole.patches):
         stride = max(1, round(raster / patch.spacing))
         row, column = np.nonzero(patch.signed_distance[::stride, ::stride] < raster)
@@ -247,8 +247,8 @@ def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrai
             places = points @ pose[..., :3].transpose(0, 2, 1) + pose[:, None, :, 3]
             x, y, z = np.moveaxis(places, -1, 0)
             near = z - terrain.heights(x, y) < NEAR_GROUND * sole.sole.length
-            found = np.union1d(found, cells_at(places[near, :2], raster))
-    return (cells_of(found) + 0.5) * raster
+            keys = np.union1d(keys, cells_at(places[near, :2], raster))
+    return (cells_of(keys) + 0.5) * raster
 
 
 def _places_under_prop(sole: SoleMotion, terrain: Terrain, raster: float) -> Array:
@@ -257,12 +257,12 @@ def _places_under_prop(sole: SoleMotion, terrain: Terrain, raster: float) -> Arr
     assert prop is not None, sole.sole.name
     near = SOLID_REACH * prop.size
     count = (len(sole.transforms) - 1) * PARTS_OF_A_FRAME + 1
-    found: Keys = np.zeros(0, dtype=np.int64)
+    keys: Keys = np.zeros(0, dtype=np.int64)
     for pose in sole.at(np.arange(count) / PARTS_OF_A_FRAME).transforms[:, 0]:
         place = posed(prop.vertices, pose)
         place = place[place[:, 2] < terrain.heights(*place[:, :2].T) + near, :2]
         if len(place):
             low, high = np.floor(place.min(axis=0) / raster), np.floor(place.max(axis=0) / raster) + 1
             box = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1)
-            found = np.union1d(found, keys_of(box.astype(np.int64)).ravel())
-    return (cells_of(found) + 0.5) * raster
+            keys = np.union1d(keys, keys_of(box.astype(np.int64)).ravel())
+    return (cells_of(keys) + 0.5) * raster

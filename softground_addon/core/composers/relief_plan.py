@@ -54,15 +54,15 @@ def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[t
     They are the feet of those who have two, and go upright on them, unless these are paws or hooves or have toes apart.
     """
     shod = set()
-    for one in inputs["characters"]:
-        steps = [step for step in footprints if step.character == one["name"]]
-        limbs = {sole["name"] for sole in one["soles"] if sole["bone"] and sole["limb"]}
-        feet = _two_feet(one)
+    for character in inputs["characters"]:
+        steps = [step for step in footprints if step.character == character["name"]]
+        limbs = {sole["name"] for sole in character["soles"] if sole["bone"] and sole["limb"]}
+        feet = _two_feet(character)
         if _is_upright([step for step in steps if step.sole in feet], [step for step in steps if step.sole in limbs]):
             pattern = inputs["tread_pattern"]
             soles = {step.sole: step.pressed_by.pressing.sole for step in steps if step.pressed_by}
             bare = {name for name, sole in soles.items() if _is_bare(sole, pattern=pattern)}
-            shod |= {(one["name"], name) for name in feet - bare}
+            shod |= {(character["name"], name) for name in feet - bare}
     return shod
 
 
@@ -73,7 +73,7 @@ def _two_feet(character: Mapping[str, Any]) -> set[str]:
 
 
 def _is_bare(sole: Sole, *, pattern: str) -> bool:
-    """Whether it is a paw, a hoof, or a foot whose toes are apart, to which the pattern of a bare foot may belong."""
+    """Return whether it is a paw, a hoof, or a foot with toes apart, to which the pattern of a bare foot may belong."""
     if sole.prop is not None:
         return False
     return sole.length < PAW * sole.breadth or (pattern != FLESH and _toes_apart(sole.outline) > APART)
@@ -95,7 +95,7 @@ def _toes_apart(outline: Array) -> float:
 
 
 def _is_upright(on_feet: Sequence[Footprint], on_limbs: Sequence[Footprint]) -> bool:
-    """Whether contacts of feet pass without those of other limbs."""
+    """Return whether contacts of feet pass without those of other limbs."""
     if not on_feet or not on_limbs:
         return True
     of_feet, of_limbs = (
@@ -154,7 +154,11 @@ def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tu
         maps = {(name, sole): text for name, sole, text in inputs["shoe_treads"]}
         return {key: SoleTread(of_map(tread_map.from_text(text))) for key, text in maps.items() if key in shod}
     under = of_map(tread_map.from_text(inputs["tread_image"])) if pattern == IMAGE else PATTERNS[pattern]
-    sides = {(one["name"], sole["name"]): sole["side"] for one in inputs["characters"] for sole in one["soles"]}
+    sides = {
+        (character["name"], sole["name"]): sole["side"]
+        for character in inputs["characters"]
+        for sole in character["soles"]
+    }
     return {key: SoleTread(under, sides[key] == "L") for key in shod}
 
 
@@ -168,26 +172,26 @@ def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -
     """
     if wanted.tread_pattern != SHOES or not (wanted.relief_look and wanted.tread_m > 0):
         return wanted
-    found = []
-    feet = {(one["name"], name) for one in wanted.inputs()["characters"] for name in _two_feet(one)}
+    treads = []
+    feet = {(item["name"], name) for item in wanted.inputs()["characters"] for name in _two_feet(item)}
     soles = [
-        (one.name, of_foot.sole)
-        for one in motions
-        for of_foot in one.soles
-        if (one.name, of_foot.sole.name) in feet and not _is_bare(of_foot.sole, pattern=SHOES)
+        (item.name, of_foot.sole)
+        for item in motions
+        for of_foot in item.soles
+        if (item.name, of_foot.sole.name) in feet and not _is_bare(of_foot.sole, pattern=SHOES)
     ]
     for name, sole in soles:
         of_sole = tread_map.from_underside(sole.underside, sole.length) if sole.underside is not None else None
         if of_sole is not None:
-            found.append((name, sole.name, tread_map.as_text(of_sole)))
-    if soles and not found:
+            treads.append((name, sole.name, tread_map.as_text(of_sole)))
+    if soles and not treads:
         names = ", ".join(f"'{name}'" for name in dict.fromkeys(name for name, _ in soles))
         raise InputError(
             f"Tread Pattern is 'From Shoes', and the soles of {names} show no grooves: model some into the undersides "
             "of their meshes (half a millimetre deep or more, vertices 4 mm apart or less), have these rendered, or "
             "choose another pattern."
         )
-    return replace(wanted, shoe_treads=tuple(found))
+    return replace(wanted, shoe_treads=tuple(treads))
 
 
 @sliced

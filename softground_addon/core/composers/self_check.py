@@ -94,23 +94,23 @@ def self_check(
     ground : str
         Its name.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for character in loads:
         yield
         motion = character.motion
         steps = [footprint for footprint in footprints if footprint.character == motion.name]
-        found += _prints(character, steps, ground)
-        found += _size(motion, cell_size)
-        found += _feet_apart(character)
-        found += _pace(character, steps)
-        found += yield from _edge(motion, steps, terrain, ground)
+        findings += _prints(character, steps, ground)
+        findings += _size(motion, cell_size)
+        findings += _feet_apart(character)
+        findings += _pace(character, steps)
+        findings += yield from _edge(motion, steps, terrain, ground)
         if motion.skin is not None:
-            found += yield from _skin(character, motion.skin, steps, terrain, ground)
+            findings += yield from _skin(character, motion.skin, steps, terrain, ground)
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
-        found.append(Finding("rim_off_ground", "note", message, "make the ground larger."))
-    return found
+        findings.append(Finding("rim_off_ground", "note", message, "make the ground larger."))
+    return findings
 
 
 def no_motion(motion: CharacterMotion) -> Finding | None:
@@ -122,7 +122,7 @@ def no_motion(motion: CharacterMotion) -> Finding | None:
 
 
 def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
-    """Whether it moves, prints and gets along."""
+    """Return whether it moves, prints and gets along."""
     motion = character.motion
     if still := no_motion(motion):
         yield still
@@ -160,7 +160,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
 
 
 def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
-    """Whether the body, its mass and the cells suit each other."""
+    """Return whether the body, its mass and the cells suit each other."""
     length = shortest_length(sole.sole.length for sole in motion.soles)
     if length < FEW_CELLS * cell_size:
         yield Finding(
@@ -193,7 +193,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
 
 
 def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
-    """Whether some feet float higher than others."""
+    """Return whether some feet float higher than others."""
     motion, contacts = character.motion, character.contacts
     feet = [number for number, sole in enumerate(motion.soles) if sole.sole.prop is None]
     offset = {motion.soles[n].sole.name: float(contacts.offset[n]) for n in feet if contacts.touching[:, n].any()}
@@ -211,7 +211,7 @@ def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
 
 
 def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Finding]:
-    """Whether it walks as fast as legs of its length swing."""
+    """Return whether it walks as fast as legs of its length swing."""
     motion = character.motion
     if motion.centre is not None or motion.four_legged:
         return
@@ -259,12 +259,12 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
             first, least, count = first if count else step.start_frame, min(least, share), count + 1
     if not count:
         return []
-    many = f"{count} steps of '{motion.name}' hang" if count > 1 else f"1 step of '{motion.name}' hangs"
+    which = f"{count} steps of '{motion.name}' hang" if count > 1 else f"1 step of '{motion.name}' hangs"
     return [
         Finding(
             "edge_of_ground",
             "warning",
-            f"{many} over the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
+            f"{which} over the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
             "the sole on it",
             "extend the ground beyond the steps.",
         )
@@ -301,7 +301,7 @@ class _Touching:
 def _skin(
     character: CharacterLoads, skin: LowSkin, steps: Sequence[Footprint], terrain: Terrain, ground: str
 ) -> Slices[list[Finding]]:
-    """Whether ground, steps and resting skin agree."""
+    """Return whether ground, steps and resting skin agree."""
     motion = character.motion
     beyond = beyond_edge(motion, terrain)
     height, has_ground = np.empty(skin.rise.shape), np.empty(skin.rise.shape, dtype=bool)
@@ -315,7 +315,7 @@ def _skin(
     over = _resting(height, skin)
     if over is None:
         return []
-    found = []
+    findings = []
     if abs(over) > OFF_SKIN * skin.height:
         if _stands_level_on_slope(motion, steps, terrain, abs(over)):
             slope = float(np.median(character.contacts.normal[character.contacts.touching][:, 2]))
@@ -329,7 +329,7 @@ def _skin(
                 )
             ]
         side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
-        found.append(
+        findings.append(
             Finding(
                 "ground_off_skin",
                 "error",
@@ -342,12 +342,12 @@ def _skin(
     rise = (height - over) / skin.height
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
-        found += yield from _skin_and_steps(motion, touching, steps)
-    return found
+        findings += yield from _skin_and_steps(motion, touching, steps)
+    return findings
 
 
 def _stands_level_on_slope(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:
-    """Whether soles lie level on ground that slopes, so that no move of it takes away that skin is `off` it [m]."""
+    """Return whether soles lie level on ground that slopes, so that no move of it mends that skin is `off` it [m]."""
     soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
     spans = [np.zeros((0, 2))]
     for step in steps:
@@ -396,9 +396,9 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
             seen += 1
             if not touching.near(step, slice(middle, middle + 1), reach).any():
                 alone.append(step.start_frame)
-    found = []
+    findings = []
     if len(alone) > DISAGREE * seen:
-        found.append(
+        findings.append(
             Finding(
                 "step_without_skin",
                 "error",
@@ -410,7 +410,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
     rests = touching.rests
     missed = np.flatnonzero(rests & ~covered)
     if len(missed) > max(DISAGREE * rests.sum(), LEAST_REST):
-        found.append(
+        findings.append(
             Finding(
                 "skin_without_step",
                 "error",
@@ -419,7 +419,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "add what rests there with Add Contact in Advanced > Contacts.",
             )
         )
-    return found
+    return findings
 
 
 def bottomed_out(footprints: Sequence[Footprint], material: GroundMaterial, ground: str) -> list[Finding]:

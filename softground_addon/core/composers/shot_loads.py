@@ -38,7 +38,7 @@ def loads_of_shot(
     InputError
         If nobody touches the ground, or it lies overhead or in layers under a foot.
     """
-    loads, known_by = [], {id(motion): found for motion, found in known}
+    loads, known_by = [], {id(motion): contacts for motion, contacts in known}
     for motion, character in zip(motions, wanted.characters, strict=True):
         if id(motion) in known_by:
             loads.append(known_by[id(motion)])

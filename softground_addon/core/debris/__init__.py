@@ -1,1 +1,1 @@
-"""What feet throw: clods in flight, booked by step, and where they come down."""
+"""Debris that feet throw: clods in flight, booked by step, and where they come down."""

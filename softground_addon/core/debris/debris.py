@@ -1,4 +1,4 @@
-"""What steps throw: crumbs and drops with closed-form flights, from where and how hard soles land, push off and leave.
+"""Crumbs and drops that steps throw: closed-form flights, from where and how hard soles land, push off and leave.
 
 References
 ----------
@@ -147,7 +147,7 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
         That they left.
     surface : str
     """
-    found: list[Throw] = []
+    throws: list[Throw] = []
     for character in loads:
         of_character = phases.phases(character)
         sliding = np.zeros(character.contacts.touching.shape, bool)
@@ -158,8 +158,8 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
             yield
             number = _footprint_of(character, phase, footprints)
             if number is not None:
-                found += _throws(character, phase, number, surfaces.find(surface).thrown, sliding)
-    return found
+                throws += _throws(character, phase, number, surfaces.find(surface).thrown, sliding)
+    return throws
 
 
 @sliced
@@ -178,32 +178,35 @@ def sources(
         [m/s²]
     """
     of_steps: dict[int, list[Throw]] = {}
-    for one in thrown:
-        of_steps.setdefault(one.number, []).append(one)
-    count, found = sum(not step.is_copy for step in steps), []
+    for throw_of_step in thrown:
+        of_steps.setdefault(throw_of_step.number, []).append(throw_of_step)
+    count, of_all = sum(not step.is_copy for step in steps), []
     for step in steps:
         yield
         if step.left is None:
             continue
-        ways = [one.placed(step.baked, step.left, step.edit) for one in of_steps.get(step.index % count, ())]
+        ways = [
+            throw_of_step.placed(step.baked, step.left, step.edit)
+            for throw_of_step in of_steps.get(step.index % count, ())
+        ]
         volumes = [_volume(way, step.left, surfaces.find(surface).thrown, gravity) for way in ways]
         scale = min(1.0, step.left.rim_m3 / max(sum(volumes), 1e-300))
-        found += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
-    return found
+        of_all += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
+    return of_all
 
 
-def volumes(found: Sequence[Source]) -> dict[int, dict[str, float]]:
-    """What steps throw, by their numbers and by phase [m³]: see `BakeRecord.thrown`."""
+def volumes(sources: Sequence[Source]) -> dict[int, dict[str, float]]:
+    """Volumes that steps throw, by their numbers and by phase [m³]: see `BakeRecord.thrown`."""
     thrown: dict[int, dict[str, float]] = {}
-    for one in found:
-        of_step = thrown.setdefault(one.step.index, {})
-        of_step[one.throw.phase] = of_step.get(one.throw.phase, 0.0) + one.volume
+    for source in sources:
+        of_step = thrown.setdefault(source.step.index, {})
+        of_step[source.throw.phase] = of_step.get(source.throw.phase, 0.0) + source.volume
     return thrown
 
 
 @sliced
 def throw(
-    found: Sequence[Source],
+    sources: Sequence[Source],
     *,
     surface: str,
     gravity: float,
@@ -224,11 +227,11 @@ def throw(
     height_at : callable, optional
         The same at a scene frame, where they change over time: pieces land on the ground of the frame they fly from.
     """
-    throwing = [one for one in found if one.volume > 1e-12]
-    kinds = 2 * sum(one.throw.kind != ThrowKind.SHED for one in throwing)  # pieces and grains
+    throwing = [source for source in sources if source.volume > 1e-12]
+    kinds = 2 * sum(source.throw.kind != ThrowKind.SHED for source in throwing)  # pieces and grains
     parts = []
-    for one in throwing:
-        parts.append(_pieces(one, surfaces.find(surface).thrown, gravity, ALL_PIECES // max(kinds, 1)))
+    for source in throwing:
+        parts.append(_pieces(source, surfaces.find(surface).thrown, gravity, ALL_PIECES // max(kinds, 1)))
         yield
     return (yield from _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None))
 
@@ -296,7 +299,7 @@ def _rows(loads: CharacterLoads, sole: int, steps: NDArray[np.intp], weights: Ar
 
 
 def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Array:
-    """How far a sole slides in each step as it pushes along the ground harder than that can bear, (K,) [m].
+    """Slide of a sole in each step as it pushes along the ground harder than that can bear, (K,) [m].
 
     Where it hardly presses, the direction of its force tells nothing.
     """
@@ -309,7 +312,7 @@ def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: 
 
 
 def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float) -> float:
-    """What is thrown by a step that left a print [m³]."""
+    """Volume thrown by a step that left a print [m³]."""
     amount = float(throw.samples[:, WEIGHT].astype(np.float64).sum())
     if throw.kind == ThrowKind.LANDING:
         share = thrown_share(throw.speed, _radius(throw, left), gravity)
@@ -324,9 +327,10 @@ def _footprint_of(loads: CharacterLoads, phase: Phase, footprints: Sequence[Foot
     name, sole = loads.motion.name, loads.motion.soles[phase.sole].sole.name
     frame = float(loads.motion.frames[min(phase.at, len(loads.motion.frames) - 1)])
     near = [
-        (abs((one.end_frame if phase.kind == "toe_off" else one.start_frame) - frame), number)
-        for number, one in enumerate(footprints)
-        if (one.character, one.sole) == (name, sole) and one.start_frame - 2 <= frame <= one.end_frame + 2
+        (abs((footprint.end_frame if phase.kind == "toe_off" else footprint.start_frame) - frame), number)
+        for number, footprint in enumerate(footprints)
+        if (footprint.character, footprint.sole) == (name, sole)
+        and footprint.start_frame - 2 <= frame <= footprint.end_frame + 2
     ]
     return min(near)[1] if near else None
 
@@ -399,7 +403,7 @@ def _radii(volume: float, sizes: tuple[float, float], most: int, random: np.rand
 
 
 def _corona(source: Source, random: np.random.Generator, count: int, gravity: float) -> tuple[Array, Array]:
-    """Where and how fast the ring around a landing starts."""
+    """Start and speed of the ring around a landing."""
     throw, left = source.throw, source.step.left
     assert left is not None
     radius = _radius(throw, left)

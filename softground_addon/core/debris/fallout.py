@@ -1,4 +1,4 @@
-"""What has come down of what steps throw, per area of the ground: for images of it."""
+"""Fallout of what steps throw, per area of the ground: for images of it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Fallout:
         self._area = np.pi * radius**2 / (SPOTS * cell_size**2)
 
     def at(self, frame: float) -> tuple[Array, Array, Array]:
-        """What lies at the points at a scene frame.
+        """Fallout at the points at a scene frame.
 
         Returns
         -------

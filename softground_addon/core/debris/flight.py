@@ -28,7 +28,7 @@ LONGEST_FLIGHT = 6.0
 
 
 def coasting(drag_time: Array, time: Array) -> Array:
-    """How long a piece would fly as fast as at first to get as far as it does against drag, (N,) [s].
+    """Time for which a piece would fly as fast as at first to get as far as it does against drag, (N,) [s].
 
     What is left of the time, it goes with the flow: falls as it settles, and drifts as the wind blows.
 
@@ -70,7 +70,7 @@ def position(start: Array, velocity: Array, drag_time: Array, time: Array, gravi
 def landing_times(
     start: Array, velocity: Array, drag_time: Array, gravity: float, height: Callable[[Array, Array], Array]
 ) -> Slices[Array]:
-    """When each comes down to the ground, (N,) [s], from its apex on; `LONGEST_FLIGHT` at most.
+    """Time until each comes down to the ground, (N,) [s], from its apex on; `LONGEST_FLIGHT` at most.
 
     The ground costs far more than the flight. So each first lands on level ground, at the height of where it came down
     the last time: nearly all settle in a few rounds. The others, at steep walls, are found by halving.
@@ -96,11 +96,11 @@ def landing_times(
         flying = start[left], velocity[left], drag_time[left]
         time[left] = down = _down_to(level[left], *flying, gravity)
         place = position(*flying, down, gravity)
-        found = ground(place[:, 0], place[:, 1])
-        flies = found < level[left]
+        below = ground(place[:, 0], place[:, 1])
+        flies = below < level[left]
         early[left[flies]], late[left[~flies]] = down[flies], down[~flies]
-        settled = np.isclose(found, level[left], rtol=0.0, atol=SETTLED)
-        level[left] = found
+        settled = np.isclose(below, level[left], rtol=0.0, atol=SETTLED)
+        level[left] = below
         left = left[~settled]
     begin, end, flying = early[left], late[left], (start[left], velocity[left], drag_time[left])
     for _ in range(HALVINGS if len(left) else 0):
@@ -155,7 +155,7 @@ class SampledHeights:
 
 
 def _down_to(level: Array, start: Array, velocity: Array, drag_time: Array, gravity: float) -> Array:
-    """When flights cross levels on their way down, (N,) [s], by Newton's method.
+    """Times at which flights cross levels on their way down, (N,) [s], by Newton's method.
 
     It begins no earlier than the crossing: a fall by h from rest takes sqrt(2·h/g) + h/v_s at most.
     """
@@ -176,5 +176,5 @@ def _down_to(level: Array, start: Array, velocity: Array, drag_time: Array, grav
 
 
 def _apex(velocity: Array, drag_time: Array, gravity: float) -> Array:
-    """When flights are highest, (N,) [s]."""
+    """Times at which flights are highest, (N,) [s]."""
     return np.asarray(drag_time * np.log1p(np.maximum(velocity[:, 2], 0.0) / (gravity * drag_time)))

@@ -89,10 +89,10 @@ def _in_weather(
     if weathering is None:
         return None
     trodden = SparseGrid(cell_size, channels=1)
-    for one in left.edited:
-        values = trodden.read(one.window)
-        values.reshape(-1)[one.contact_cells] = 1.0
-        trodden.write(one.window, values)
+    for footprint in left.edited:
+        values = trodden.read(footprint.window)
+        values.reshape(-1)[footprint.contact_cells] = 1.0
+        trodden.write(footprint.window, values)
 
     def height_at(frame: float) -> Height:
         level = weathering.level(frame)

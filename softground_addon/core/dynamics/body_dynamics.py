@@ -1,4 +1,4 @@
-"""What a body's motion says about the forces on it: their sum, and the point of the ground through which they act."""
+"""Forces on a body from its motion: their sum, and the point of the ground through which they act."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class BodyDynamics:
     slow: BodyDynamics | None = None
 
     def point_of_action(self, ground: Array, steps: slice | NDArray[np.intp] = slice(None)) -> Array:
-        """Where the total force meets the level `ground` (...,) [m] at steps (...,): the zero moment point.
+        """Zero moment point: where the total force meets the level `ground` (...,) [m] at steps (...,).
 
         Where the force is too small to have one, the projection of the centre of mass.
 
@@ -257,8 +257,8 @@ def _cutoff_in_flight(
     def misfit(octaves: float) -> float:
         cutoff = usual * 2.0**octaves
         falling = np.zeros((flying.sum(), *parts.shape[1:]))
-        for some, factor in passes:
-            falling[:, some] = _accelerations(parts[:, some], step, factor * cutoff)[flying]
+        for part, factor in passes:
+            falling[:, part] = _accelerations(parts[:, part], step, factor * cutoff)[flying]
         _, _, misfit = fitted_to_free_fall(body.points, falling, fall, independent=_independent(motion), whole=False)
         return misfit + (octaves / CUTOFF_DEVIATION) ** 2
 
@@ -313,7 +313,7 @@ def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:
 
 
 def _downhill(score: Callable[[float], float], start: float, stride: float, limits: tuple[float, float]) -> float:
-    """Where a function with one valley is lowest: from `start` on by strides, then on the parabola through three."""
+    """Minimum of a function with one valley: from `start` on by strides, then on the parabola through three."""
     low, high = limits
     best = start
     for further in (stride, -stride):
@@ -347,7 +347,7 @@ def flights(airborne: Mask, body: BodyDynamics, motion: CharacterMotion) -> Mask
 
 
 def _walks_over(motion: CharacterMotion, first: NDArray[np.intp], last: NDArray[np.intp]) -> Mask:
-    """Whether the body moves on from step `first` to `last` (I,) while a point of some sole hardly does, (I,)."""
+    """Return whether the body moves on from step `first` to `last` (I,) while a point of a sole hardly does, (I,)."""
     if not len(first):
         return np.zeros(0, dtype=bool)
     hips = motion.hips

@@ -1,4 +1,4 @@
-"""Where a body's mass is: segments from the joints that are mapped, their centre of mass, and what free fall tells.
+"""Mass of a body: segments from the joints that are mapped, their centre of mass, and what free fall tells.
 
 Mass fractions and segment centres are those of de Leva (1996), "Adjustments to Zatsiorsky-Seluyanov's segment inertia
 parameters", J. Biomechanics 29(9), table 4, male; four-legged animals have their own.
@@ -124,11 +124,11 @@ class MassPoints:
         return self.fractions @ self.positions
 
     def legs_moment(self) -> Array:
-        """What the legs contribute to `centre`, (N, 3) [m]."""
+        """Share of the legs in `centre`, (N, 3) [m]."""
         return (self.fractions * self.legs) @ self.positions
 
     def legs_of_parts(self) -> NDArray[np.bool_]:
-        """Which parts are legs, (parts,)."""
+        """Mask of the parts that are legs, (parts,)."""
         legs = np.zeros(self.parts.max() + 1, dtype=bool)
         legs[self.parts] = self.legs
         return legs

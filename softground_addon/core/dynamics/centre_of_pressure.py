@@ -1,4 +1,4 @@
-"""Where on each sole the ground presses: from the heel to the toes as the foot rolls."""
+"""Centre of pressure on each sole: from the heel to the toes as the foot rolls."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def lowest_points(motion: CharacterMotion) -> Array:
 
 
 def extents(motion: CharacterMotion, lowest: Array) -> Array:
-    """How far each sole can press about its `lowest_points` (N, S, 3), on the level: standard deviation, (N, S) [m].
+    """Spread of each sole's pressure about its `lowest_points` (N, S, 3), on the level: standard deviation, (N, S) [m].
 
     Little on the heel or on the toes, most on a flat foot.
     """
@@ -47,7 +47,7 @@ def _nearness(points: Array, motion: CharacterMotion) -> Array:
 
 
 def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, target: Array, trust: Array) -> Array:
-    """Where each sole presses when the loads' common point of action is known, (N, S, 3) [m].
+    """Centres of pressure of the soles when the loads' common point of action is known, (N, S, 3) [m].
 
     Each sole's centre moves along the sole from its `lowest_points` toward the place at which the loads' moment
     agrees with the point of action, as far as landmarks are low enough to bear: from the heel at heel strike to the

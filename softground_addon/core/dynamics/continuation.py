@@ -95,8 +95,8 @@ def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) ->
     here = np.array([frame])
     weight = VELOCITY_WEIGHT * motion.pendulum_time
 
-    def distances(some: slice) -> Array:
-        frames = others[some]
+    def distances(part: slice) -> Array:
+        frames = others[part]
         moved = weight * (velocity(frames) - velocity(here))
         return np.sqrt(((points(frames) - points(here)) ** 2 + moved**2).sum(axis=-1).mean(axis=-1))
 

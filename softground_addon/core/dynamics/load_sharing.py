@@ -1,4 +1,4 @@
-"""How several contacts share one load: smooth transitions, and non-negative least squares on force and moment."""
+"""Sharing of one load by several contacts: smooth transitions, and non-negative least squares on force and moment."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, bo
 
 
 def point_of_action(motion: CharacterMotion, lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
-    """Where the total force meets the level of the soles that touch, (N, 2) [m]."""
+    """Point where the total force meets the level of the soles that touch, (N, 2) [m]."""
     count = touching.sum(axis=1)
     ground = (lowest[..., 2] * touching).sum(axis=1) / np.maximum(count, 1)
     point = body.point_of_action(ground)
@@ -72,14 +72,14 @@ def _standing(motion: CharacterMotion, touching: Mask) -> Mask:
 
 
 def _beside(motion: CharacterMotion, lowest: Array, point: Array, bearing: Mask) -> Array:
-    """How far a point (N, 2) is beside each sole while it bears (N, S), one sole after the other (B,) [m]."""
-    found = []
+    """Distance of a point (N, 2) beside each sole while it bears (N, S), one sole after the other (B,) [m]."""
+    distances = []
     for index, sole in enumerate(motion.soles):
         steps = bearing[:, index]
         points = sole.landmark_positions()[steps]
         (x, y), (u, v) = (points[:, -1, :2] - points[:, 0, :2]).T, (point[steps] - lowest[steps, index, :2]).T
-        found.append((x * v - y * u) / np.maximum(np.hypot(x, y), 1e-9))
-    return np.concatenate(found)
+        distances.append((x * v - y * u) / np.maximum(np.hypot(x, y), 1e-9))
+    return np.concatenate(distances)
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:
@@ -146,7 +146,7 @@ def share_through_transitions(points: Array, target: Array, touching: Mask, *, d
 
 
 def _ramps(touching: Mask, longest: int) -> Array:
-    """How far each contact is from its ends: 0 at an end that others bridge, 1 away from it, (N, S).
+    """Nearness of each contact to its ends: 0 at an end that others bridge, 1 away from it, (N, S).
 
     A ramp lasts while the others bear too, and no longer than they bear without this sole: two feet that land just
     after one another do not hand over for long.
@@ -179,7 +179,7 @@ def _ramp_lengths(first: NDArray[np.intp], last: NDArray[np.intp], start: Array,
 
 
 def _within(step: NDArray[np.intp], start: Array, end: NDArray[np.intp]) -> Mask:
-    """Which intervals (J,) hold which steps (I,) inside, (I, J)."""
+    """Mask of the steps (I,) inside the intervals (J,), (I, J)."""
     return (start < step[:, None]) & (step[:, None] < end)
 
 

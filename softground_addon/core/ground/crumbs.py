@@ -119,7 +119,7 @@ def _lump(like: surfaces.Fragments, number: int, stretch: tuple[float, float, fl
 def _sphere() -> tuple[Array, NDArray[np.intp]]:
     """Points on a sphere, nearly as far from each other, and the triangles between them: an icosahedron, refined."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
-    corners = [(0.0, one, other) for one in (-1.0, 1.0) for other in (-golden, golden)]
+    corners = [(0.0, side, other) for side in (-1.0, 1.0) for other in (-golden, golden)]
     points = np.array([np.roll(corner, axis) for axis in range(3) for corner in corners])
     apart = np.linalg.norm(points[:, None] - points, axis=-1)
     near = np.abs(apart - 2.0) < 1e-6
@@ -188,6 +188,6 @@ def _upper_side(lump: Lump, x: Array, y: Array) -> Array:
         if double > 1e-12:  # seen from above
             u = ((x - a[0]) * across[1] - (y - a[1]) * across[0]) / double
             v = (along[0] * (y - a[1]) - along[1] * (x - a[0])) / double
-            there = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-            highest[there] = np.maximum(highest, a[2] + u * along[2] + v * across[2])[there]
+            inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+            highest[inside] = np.maximum(highest, a[2] + u * along[2] + v * across[2])[inside]
     return highest

@@ -23,7 +23,7 @@ UNSAID = {"said_if_on": True}
 
 @dataclass(frozen=True)
 class GroundMaterial:
-    """What the ground is made of.
+    """Material of the ground.
 
     The fields from `rim_bias` on go beyond the paper; at 0 they are off.
 

@@ -38,8 +38,8 @@ class Places:
         low = np.floor(np.array([window.column, window.row]) * cell_size / self.BIN)
         high = np.floor(np.array([window.column + window.columns, window.row + window.rows]) * cell_size / self.BIN)
         near = (self._columns >= low[0]) & (self._columns <= high[0]) & (self._rows >= low[1]) & (self._rows <= high[1])
-        found = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
-        points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
+        runs = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
+        points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *runs]))
         return points[inside(window, cell_size, self.x[points], self.y[points])]
 
     def window(self, points: Indices, cell_size: float) -> Window:

@@ -178,7 +178,7 @@ def soft_to_firm(shown: Iterable[Preset]) -> list[Preset]:
     softest: dict[str, float] = {}
     for preset, depth in depths.items():
         softest[preset.surface] = max(depth, softest.get(preset.surface, 0.0))
-    return sorted(depths, key=lambda one: (-softest[one.surface], one.surface, -depths[one], one.name.casefold()))
+    return sorted(depths, key=lambda item: (-softest[item.surface], item.surface, -depths[item], item.name.casefold()))
 
 
 def _files(folders: tuple[Path, ...]) -> list[Path]:
@@ -187,11 +187,11 @@ def _files(folders: tuple[Path, ...]) -> list[Path]:
 
 def names(folders: tuple[Path, ...] = (FOLDER,)) -> list[str]:
     """Names of the presets in some folders, in their order; broken files are left out."""
-    found = []
+    names_of_files = []
     for path in _files(folders):
         with suppress(InputError):
-            found.append(load(path).name)
-    return found
+            names_of_files.append(load(path).name)
+    return names_of_files
 
 
 def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:

@@ -59,7 +59,7 @@ class Window(NamedTuple):
         return first * cell_size, (first + size) * cell_size
 
     def holds(self, row: Indices, column: Indices) -> Mask:
-        """Whether cells lie within the window."""
+        """Return whether cells lie within the window."""
         right, down = column - self.column, row - self.row
         return (right >= 0) & (right < self.columns) & (down >= 0) & (down < self.rows)
 
@@ -76,7 +76,7 @@ class Window(NamedTuple):
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
     def intersects(self, other: Window) -> bool:
-        """Whether the two share a cell."""
+        """Return whether the two share a cell."""
         return (
             self.column < other.column + other.columns
             and other.column < self.column + self.columns

@@ -137,7 +137,7 @@ class MeshTerrain:
         return values.T.reshape(-1, *np.shape(x))
 
     def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Whether no second upward-facing surface lies below the highest one, for each place."""
+        """Return whether no second upward-facing surface lies below the highest one, for each place."""
         across, along = np.ravel(x), np.ravel(y)
         top = self.heights(across, along)
         single = np.ones(np.size(x), dtype=bool)

@@ -268,7 +268,7 @@ def _container_limits(system: Path = Path("/")) -> Iterator[float]:
         else:
             continue
         inner = root / path.lstrip("/")  # a container may see its own group as the root
-        for folder in {root, inner, *(one for one in inner.parents if root in one.parents)}:
+        for folder in {root, inner, *(parent for parent in inner.parents if root in parent.parents)}:
             try:
                 yield float((folder / name).read_text())
             except (OSError, ValueError):  # "max"

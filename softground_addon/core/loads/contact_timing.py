@@ -248,7 +248,7 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
         for sole in range(touching.shape[1])
         for first, last in zip(*runs(touching[:, sole]), strict=True)
     ]
-    found = []
+    changes = []
     for first, last, leading in intervals:
         if first == 0:
             continue
@@ -263,8 +263,8 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
         window = slice(max(min(first, leave) - reach, 0), max(first, leave) + reach)
         others = np.delete(touching[window], (leading, trailing), axis=1)
         if not others.any():
-            found.append(Transition(trailing, leading, first, leave))
-    return found
+            changes.append(Transition(trailing, leading, first, leave))
+    return changes
 
 
 @dataclass(frozen=True)
@@ -294,18 +294,23 @@ def _fit_overlaps(
 ) -> NDArray[np.intp]:
     """Strike and leave of each transition whose cosine ramp fits the point of action best, (T, 2)."""
     search = max(round(SEARCH * unit), 1)
-    found = np.array([(change.strike, change.leave) for change in changes]).reshape(-1, 2)
-    begin = np.maximum(found.min(axis=1) - search, 0)
-    end = np.minimum(found.max(axis=1) + search, len(lowest))
-    fitted = found.copy()
+    ramps = np.array([(change.strike, change.leave) for change in changes]).reshape(-1, 2)
+    begin = np.maximum(ramps.min(axis=1) - search, 0)
+    end = np.minimum(ramps.max(axis=1) + search, len(lowest))
+    fitted = ramps.copy()
     # Those whose windows are about as long are fitted together.
     width = -(-(end - begin) // WINDOW_UNIT) * WINDOW_UNIT
     alike = [np.flatnonzero(width == steps) for steps in np.unique(width)]
-    for some in (part for group in alike for part in np.split(group, range(AT_ONCE, len(group), AT_ONCE))):
-        feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
-        windows = _Windows(found[some], feet, begin[some, None] + np.arange(width[some[0]]), end[some])
+    for batch in (part for group in alike for part in np.split(group, range(AT_ONCE, len(group), AT_ONCE))):
+        feet = np.array([(changes[index].trailing, changes[index].leading) for index in batch])
+        windows = _Windows(
+            ramps[batch],
+            feet,
+            begin[batch, None] + np.arange(width[batch[0]]),
+            end[batch],
+        )
         share, telling = _shares_told(windows, lowest, extent, body, unit)
-        fitted[some] = _best_ramps(windows, share, telling, unit)
+        fitted[batch] = _best_ramps(windows, share, telling, unit)
     return fitted
 
 
@@ -345,9 +350,9 @@ def _shares_told(
 
 def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) -> NDArray[np.intp]:
     """The pairs of strike and leave near those found whose ramps fit the shares (T, W) best, (T, 2)."""
-    found, step, end = windows.found, windows.step, windows.end[:, None]
+    first, step, end = windows.found, windows.step, windows.end[:, None]
     search = max(round(SEARCH * unit), 1)
-    best = found
+    best = first
     for stride in (COARSE_STRIDE, 1):
         reach = search // stride * stride if stride > 1 else COARSE_STRIDE - 1
         offset = np.arange(-reach, reach + 1, stride)
@@ -360,7 +365,7 @@ def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) ->
         ramp += 2 * share[:, None] - 1  # minus twice the misfit of a ramp (1 - cos)/2
         # A matrix product would wake the threads of the BLAS library, which cost more than they save here.
         misfit = np.einsum("gpw,gw->gp", np.square(ramp, out=ramp), telling / 4)
-        moved = (pairs - found[:, None]) / unit
+        moved = (pairs - first[:, None]) / unit
         cost = np.where(possible, misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=-1), np.inf)
         least = np.take_along_axis(pairs, cost.argmin(axis=1)[:, None, None], axis=1)[:, 0]
         best = np.where(possible.any(axis=1, keepdims=True), least, best)

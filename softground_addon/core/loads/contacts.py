@@ -135,11 +135,11 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contact
     if seen is not None and (drift.any() or not motion.joints):
         return seen
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
-    found = [
+    of_soles = [
         _detect(track, drift, body_speed, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
         for track, sole in zip(tracks, motion.soles, strict=True)
     ]
-    sharp, offset = (np.array(values) for values in zip(*found, strict=True))
+    sharp, offset = (np.array(values) for values in zip(*of_soles, strict=True))
     if seen is not None and np.ptp(offset) > LEAVE_HEIGHT * motion.leg_length:
         return seen  # the feet of one body stand on one ground: these heights are those of feet that swing
     dated = [

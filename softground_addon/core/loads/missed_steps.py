@@ -85,8 +85,8 @@ def _rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64])
 
 def advice(name: str, missed: Sequence[MissedStep], ground: str) -> Finding:
     """What to tell the user of a character's missed steps: how many, from when on, and what to do."""
-    many = len(missed) > 1
-    count, meet, leave = (f"{len(missed)} steps", "meet", "leave") if many else ("1 step", "meets", "leaves")
+    several = len(missed) > 1
+    count, meet, leave = (f"{len(missed)} steps", "meet", "leave") if several else ("1 step", "meets", "leaves")
     beyond = sum(np.isinf(step.clearance) for step in missed)
     heights = [step.clearance for step in missed if np.isfinite(step.clearance)]
     where = [f"{beyond} beyond its edge or on its walls"] if beyond else []

@@ -50,7 +50,7 @@ class LevelBeyondEdge:
             across, along = (np.rint(np.broadcast_to(each, height.shape)[missing] / RASTER) for each in (x, y))
             place, same = np.unique(across + 1j * along, return_inverse=True)
             beyond = np.stack([place.real, place.imag], axis=-1) * RASTER
-            height[missing] = in_stretches(lambda some: self._at_edge(beyond[some]), len(beyond))[same]
+            height[missing] = in_stretches(lambda part: self._at_edge(beyond[part]), len(beyond))[same]
         return height
 
     def _at_edge(self, beyond: Array) -> Array:
@@ -104,8 +104,8 @@ def without_missing(
 def _has_ground(sole: SoleMotion, steps: NDArray[np.intp], terrain: Terrain) -> Mask:
     """True where some of a sole is over ground, (N,)."""
 
-    def highest(some: slice) -> Array:
-        x, y = np.moveaxis(_spots(sole, steps[some]), -1, 0)
+    def highest(part: slice) -> Array:
+        x, y = np.moveaxis(_spots(sole, steps[part]), -1, 0)
         return np.asarray(np.fmax.reduce(terrain.heights(x, y), axis=1))
 
     return np.isfinite(in_stretches(highest, len(steps)))

@@ -1,1 +1,1 @@
-"""What a rig did: the motion of a character, of its soles and of props."""
+"""Motion of a rig: of a character, of its soles and of props."""

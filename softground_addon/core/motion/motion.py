@@ -1,4 +1,4 @@
-"""What a rig did: sole poses and joints over time, as plain arrays in SI units, Z up.
+"""Motion of a rig: sole poses and joints over time, as plain arrays in SI units, Z up.
 
 This is the border between Blender and the physics. Everything that the core knows about a character is in one
 `CharacterMotion`; nothing in it refers to bones or objects.
@@ -185,7 +185,7 @@ class CharacterMotion:
 
     @cached_property
     def on_frames(self) -> NDArray[np.bool_]:
-        """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
+        """Indices of the samples at scene frames (F,): between them a resampled motion is interpolated."""
         return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
 
     @cached_property

@@ -22,7 +22,7 @@ Fraction = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class Sinking:
-    """How a sole sinks into the ground, at each of N steps.
+    """Sinking of a sole into the ground, at each of N steps.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, lan
 
 
 def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
-    """How much of each piece of a posed sole touches the ground, 0 to 1.
+    """Share of each piece of a posed sole that touches the ground, 0 to 1.
 
     The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
     ground too. A tolerance on top stands for what is not known: the softness of skin and shoe and the exact pose.

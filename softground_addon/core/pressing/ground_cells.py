@@ -1,4 +1,4 @@
-"""What contacts are laid out on: the ground in cells, the steps of time, and the cells that are pressed at each."""
+"""Cells of the ground that contacts are laid out on, the steps of time, and the cells that are pressed at each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Timing:
-    """How simulation steps and scene frames relate.
+    """Relation between simulation steps and scene frames.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class UndisturbedCells:
         return self._tiles[divisions].surface(window.refined(divisions))
 
     def factors(self, window: Window) -> Factors | None:
-        """How the ground varies over a window; None where it does not."""
+        """Variation of the ground over a window; None where it does not vary."""
         return self._variation.factors(window) if self._variation else None
 
 
@@ -95,7 +95,7 @@ class GroundCells:
 
 @dataclass(frozen=True)
 class Loads:
-    """How a sole loads the ground, at each of N steps or parts of them.
+    """Load of a sole on the ground, at each of N steps or parts of them.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How deep a load presses a rigid body into the ground, and the shape of the hollow: bowls, ruts, grooves.
+"""Depth to which a load presses a rigid body into the ground, and the shape of the hollow: bowls, ruts, grooves.
 
 A flat sole presses evenly, and the ground gives way as `ground_law` says of stress = force/area. The same ground under
 a body of any shape is a bed of springs, each of which carries what the law says of how far the body presses it down
@@ -52,7 +52,7 @@ class Springs:
     depth: Array | float = 1.0
 
     def sinkage(self, force: float, material: GroundMaterial, firmness: float = 1.0, near: float = 0.0) -> float:
-        """How far the lowest sample sinks under a lasting force [N], at most by what the layer gives way [m].
+        """Sinkage of the lowest sample under a lasting force [N], at most by what the layer gives way [m].
 
         Parameters
         ----------
@@ -130,13 +130,13 @@ def stress(
     stiffness: Array | float = 1.0,
     depth: Array | float = 1.0,
 ) -> Array:
-    """What the ground carries where it is compressed so far [Pa]: the inverse of `deformation.target_compression`."""
+    """Pressure of the ground where it is compressed so far [Pa]: the inverse of `deformation.target_compression`."""
     layer = np.maximum(material.layer_depth * np.asarray(depth), TINY)
     return np.asarray(material.youngs_modulus * firmness * stiffness * load_at(compression / layer, material))
 
 
 def _reach(start: Array, gain: Array, load: float) -> float:
-    """Where the sum of gain·max(0, x - start) comes to the load: exact, as it is straight between the starts."""
+    """Solution x of sum(gain·max(0, x - start)) = load: exact, as the sum is straight between the starts."""
     order = np.argsort(start, kind="stable")
     start, gain = start[order], np.cumsum(gain[order])
     carried = np.concatenate([[0.0], np.cumsum(gain[:-1] * np.diff(start))])  # at each start

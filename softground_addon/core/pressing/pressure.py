@@ -1,4 +1,4 @@
-"""How the force on a sole spreads over its contact: evenly, or so that it acts at the centre of pressure."""
+"""Spread of the force on a sole over its contact: evenly, or so that it acts at the centre of pressure."""
 
 from __future__ import annotations
 
@@ -129,12 +129,12 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     linear = field[off]
     for points in ((near_x[:, sample], near_y[:, sample], few), (near_x, near_y, part)):
         field[off] = _fitted(field[off], *points, wanted[off], highest[off], spread[off], blunt)
-    kept = np.ones(len(field))
-    kept[off] = _force(field[off], near_x, near_y, highest[off], part)
-    astray = np.flatnonzero(~(np.abs(kept[off] - 1.0) < ASTRAY))  # too few points to fit: the beam's section it is
+    bearing = np.ones(len(field))
+    bearing[off] = _force(field[off], near_x, near_y, highest[off], part)
+    astray = np.flatnonzero(~(np.abs(bearing[off] - 1.0) < ASTRAY))  # too few points to fit: the beam's section it is
     field[off[astray]] = linear[astray]
-    kept[off[astray]] = _force(linear[astray], near_x[astray], near_y[astray], highest[off[astray]], part[astray])
-    return PressureField(middle, field[:, 0] / kept, field[:, 1:] / kept[:, None], highest / kept)
+    bearing[off[astray]] = _force(linear[astray], near_x[astray], near_y[astray], highest[off[astray]], part[astray])
+    return PressureField(middle, field[:, 0] / bearing, field[:, 1:] / bearing[:, None], highest / bearing)
 
 
 def spread_out(relative: Single, widening: Array) -> None:
@@ -214,9 +214,9 @@ def _pressure(field: Array, x: Single, y: Single, highest: Array) -> Single:
 def _moments(weight: Single, x: Single, y: Single) -> Array:
     """Sums of the products of (1, x, y) over weighted points, (N, 3, 3)."""
     along_x, along_y = weight * x, weight * y
-    one, first, second = weight.sum(axis=1), along_x.sum(axis=1), along_y.sum(axis=1)
+    zeroth, first, second = weight.sum(axis=1), along_x.sum(axis=1), along_y.sum(axis=1)
     xx, xy, yy = (np.einsum("nq,nq->n", *pair) for pair in ((along_x, x), (along_x, y), (along_y, y)))
-    return np.moveaxis(np.array([[one, first, second], [first, xx, xy], [second, xy, yy]], dtype=float), -1, 0)
+    return np.moveaxis(np.array([[zeroth, first, second], [first, xx, xy], [second, xy, yy]], dtype=float), -1, 0)
 
 
 def _limited(pressure: Any, highest: Any) -> Any:

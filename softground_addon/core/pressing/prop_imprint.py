@@ -1,4 +1,4 @@
-"""What of a posed rigid body faces the ground: its underside by a z-buffer, sample by sample above the ground."""
+"""Underside of a posed rigid body by a z-buffer, sample by sample above the ground."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ class PropLayout(ContactLayout):
         factors: Factors | None,
         reached: float,
     ) -> _Indentation:
-        """What the body presses at a pose, under a lasting force, after one under which it sank so far [m]."""
+        """Hollow of the body at a pose, under a lasting force, after one under which it sank so far [m]."""
         shape = (cells.window.rows, cells.window.columns)
         indentation = _Indentation(np.zeros(shape), np.zeros(shape), 0.0, 0.0)
         deepest = material.deepest * (float(factors.depth.max()) if factors else 1.0)
@@ -192,7 +192,7 @@ class PropLayout(ContactLayout):
 
 @dataclass(frozen=True)
 class _Indentation:
-    """What a body presses into the cells of a window.
+    """Depth to which a body presses the cells of a window.
 
     Attributes
     ----------

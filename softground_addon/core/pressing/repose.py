@@ -83,9 +83,9 @@ def slid(
     ground = np.where(fixed, 0.0, terrain)
     steepest = tan(angle) * cell_size
     rests = np.full((len(NEIGHBOURS), *rim.shape), np.inf)
-    for rest, (one, other, way) in zip(rests, NEIGHBOURS, strict=True):
-        rest[one] = np.maximum(np.abs(ground[one] - ground[other]), steepest * hypot(*way))
-        rest[one][fixed[one] | fixed[other]] = np.inf
+    for rest, (near, other, way) in zip(rests, NEIGHBOURS, strict=True):
+        rest[near] = np.maximum(np.abs(ground[near] - ground[other]), steepest * hypot(*way))
+        rest[near][fixed[near] | fixed[other]] = np.inf
     before = ground - compression + rim
     height, box = before.copy(), (slice(0, len(rim)), slice(0, rim.shape[1]))
     for first in range(0, sweeps, SWEEPS_AT_ONCE):
@@ -103,11 +103,11 @@ def _around_steep(height: Array, rests: Array, box: Cells, bound: float) -> Cell
     box = _grown(box, height.shape, 1)
     part = height[box]
     steep = np.zeros(part.shape, bool)
-    for rest, (one, other, _) in zip(rests[:, *box], NEIGHBOURS, strict=True):
-        excess = np.abs(part[one] - part[other])
-        excess -= rest[one]
+    for rest, (near, other, _) in zip(rests[:, *box], NEIGHBOURS, strict=True):
+        excess = np.abs(part[near] - part[other])
+        excess -= rest[near]
         above = excess > bound
-        steep[one] |= above
+        steep[near] |= above
         steep[other] |= above
     rows, columns = np.divmod(np.flatnonzero(steep), steep.shape[1])
     if not len(rows):
@@ -138,8 +138,8 @@ def _swept(height: Array, rests: Array, odd_row: int, odd_column: int, sweeps: i
     of_cells = np.zeros((-(-inside[0].stop // 2) * 2, -(-columns // 2) * 2))
     of_cells[inside] = height
     of_pairs = np.full((len(NEIGHBOURS), *of_cells.shape), np.inf)
-    for pairs, rest, (one, _, _) in zip(of_pairs[:, *inside], rests, NEIGHBOURS, strict=True):
-        pairs[one] = rest[one]
+    for pairs, rest, (near, _, _) in zip(of_pairs[:, *inside], rests, NEIGHBOURS, strict=True):
+        pairs[near] = rest[near]
     cells, most = _even_first(of_cells), _even_first(of_pairs)
     width, count = of_cells.shape[1], of_cells.size // 2
     turns = []
@@ -155,13 +155,13 @@ def _swept(height: Array, rests: Array, odd_row: int, odd_column: int, sweeps: i
             turns.append((*pair, rest[count * number : count * (number + 1)][ones]))
     sets = [(*turn, -turn[-1], *np.empty((2, len(turn[-1])))) for turn in turns]
     for _ in range(sweeps):
-        for one, other, rest, opposite, move, held in sets:
-            np.subtract(one, other, out=move)
+        for near, other, rest, opposite, move, held in sets:
+            np.subtract(near, other, out=move)
             np.minimum(move, rest, out=held)
             np.maximum(held, opposite, out=held)
             np.subtract(move, held, out=move)
             np.multiply(move, 0.5, out=move)
-            np.subtract(one, move, out=one)
+            np.subtract(near, move, out=near)
             np.add(other, move, out=other)
     together = np.empty_like(of_cells)
     together[0::2], together[1::2] = cells.reshape(2, -1, width)

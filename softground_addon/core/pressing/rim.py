@@ -85,7 +85,7 @@ def _leaning(coverage: Fraction, toward: Array) -> Fraction:
 
 
 def lean_of_landing(path: Array, length: float) -> Array:
-    """Which way the rim of a sole that touches down leans, and how far, (2,): the way that it comes, seen from above.
+    """Lean of the rim of a sole that touches down, (2,): along the way that it comes, seen from above.
 
     It leans to 1 under a sole that comes along the ground, to 0 under one that comes straight down.
 
@@ -102,7 +102,7 @@ def lean_of_landing(path: Array, length: float) -> Array:
 
 
 def leaning(path: Array, length: float, start: Array) -> Array:
-    """Which way the rim of a sole leans, and how far, at each of N steps, (N, 2), at most 1 long.
+    """Lean of the rim of a sole at each of N steps, (N, 2), at most 1 long.
 
     Ground that gives way goes on in the direction in which the sole has set it moving: a sole that is planted keeps
     the lean that it landed with, and one that slides, rolls on or pushes off turns it to where it moves, over the
@@ -128,10 +128,10 @@ def leaning(path: Array, length: float, start: Array) -> Array:
     way = np.diff(path[:, :2], axis=0) @ np.array([1.0, 1.0j])
     distance = np.abs(way)
     toward = np.divide(way, distance, out=np.zeros_like(way), where=distance > 1e-9 * length)
-    kept = np.exp(-distance / (LEANING_DISTANCE * length))
+    weights = np.exp(-distance / (LEANING_DISTANCE * length))
     lean = complex(*start)
     leans = []
-    for direction, part in zip(toward.tolist(), kept.tolist(), strict=True):
+    for direction, part in zip(toward.tolist(), weights.tolist(), strict=True):
         lean = direction + (lean - direction) * part
         leans.append(lean)
     return np.array(leans, complex).view(float).reshape(-1, 2)
@@ -148,7 +148,7 @@ def in_contact(coverage: Fraction) -> Mask:
 
 
 def whole_reach(reach: float) -> int:
-    """How many cells away from a contact its rim ends, at least one, with a reach in cells."""
+    """Distance in cells from a contact to the end of its rim, at least one, with a reach in cells."""
     return max(1, int(reach + 1e-6))
 
 

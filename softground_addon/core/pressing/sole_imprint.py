@@ -1,4 +1,4 @@
-"""Which cells a posed sole meets: they are mapped back into the frame of each patch, to see what it covers of them.
+"""Cells that a posed sole meets: they are mapped back into the frame of each patch, to see what it covers of them.
 
 How much of the sole meets the ground is measured at points of its own (`sole_points`), whatever the size of the cells.
 """
@@ -70,7 +70,7 @@ def cell_coverage(
 def patches_over_cells(
     sole: Sole, transforms: Array, ground: Surface, *, lowest: Array, tolerance: float
 ) -> Iterator[tuple[NDArray[np.intp], Single, Single]]:
-    """What each patch of a sole covers of the ground's cells, whether it touches them or not, at each of N steps.
+    """Cover of the ground's cells by each patch of a sole, whether it touches them or not, at each of N steps.
 
     Parameters
     ----------
@@ -135,7 +135,9 @@ def _underside(
     slack_u, slack_v = cell_size + sideways
     near = (u > low[0] - slack_u) & (u < high[0] + slack_u) & (v > low[1] - slack_v) & (v < high[1] + slack_v)
     cells = np.flatnonzero(near.any(axis=0))
-    u, v = (one.reshape(len(pose), -1).take(cells, axis=1) for one in (u, v))  # in C order, as fancy indexing is not
+    u, v = (
+        coordinate.reshape(len(pose), -1).take(cells, axis=1) for coordinate in (u, v)
+    )  # in C order, as fancy indexing is not
     if sideways.max() > NEGLIGIBLE_SHIFT * cell_size:
         height = Nodes.under(patch, u, v).interpolate(patch.heights)
         u -= shift[0] * height

@@ -1,4 +1,4 @@
-"""How much of a posed sole's underside is how high above the ground, at points fixed to the sole.
+"""Heights of a posed sole's underside above the ground, at points fixed to the sole.
 
 They measure height and area whatever the size of the cells and wherever the sole stands, many steps in one go.
 """
@@ -206,7 +206,7 @@ def _posed(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
 
 
 def has_steps(ground: Surface, jump: float) -> bool:
-    """Whether neighbouring cells of the ground differ in height by more than a jump [m]."""
+    """Return whether neighbouring cells of the ground differ in height by more than a jump [m]."""
     heights = np.where(ground.bears, ground.heights, np.nan)
     with np.errstate(invalid="ignore"):
         return (
@@ -229,14 +229,14 @@ def _inside_walls(clearance: Array, level: Array, jump: float) -> Mask:
     jump : float
         Least difference between the parts [m].
     """
-    there = clearance < FAR
-    level = np.where(there, level, np.inf)
+    near = clearance < FAR
+    level = np.where(near, level, np.inf)
     ordered = np.sort(level, axis=1)
     with np.errstate(invalid="ignore"):
         rise = np.diff(ordered, axis=1)
     rise[~np.isfinite(rise)] = 0.0
     edge = np.take_along_axis(ordered, rise.argmax(axis=1)[:, None], axis=1)
-    upper, lower = there & (level > edge), there & (level <= edge)
+    upper, lower = near & (level > edge), near & (level <= edge)
     on_upper, on_lower = (np.where(part, clearance, np.inf).min(axis=1) for part in (upper, lower))
     sticks = (rise.max(axis=1) > jump) & (on_upper < 0) & (-on_upper > np.abs(on_lower))
     return np.asarray(upper & sticks[:, None])

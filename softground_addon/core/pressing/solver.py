@@ -51,7 +51,7 @@ class GroundSolver:
 
     @property
     def material(self) -> GroundMaterial:
-        """What the ground is made of."""
+        """Material of the ground."""
         return self.cells.material
 
     @property
@@ -100,7 +100,7 @@ class GroundSolver:
                 parts.append((contact, contact.imprints(first, last, self.cells, timing), first, last))
         windows = [imprints.window for _, imprints, _, _ in parts]
         spans = [(start, end)]
-        if any(one.intersects(other) for one, other in combinations(windows, 2)):
+        if any(window.intersects(other) for window, other in combinations(windows, 2)):
             spans = [(step, step + 1) for step in range(start, end)]
         for begin, stop in spans:
             for contact, imprints, first, last in parts:
@@ -145,7 +145,7 @@ class GroundSolver:
         whole[0] += lowered
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
-        found = state[0].copy()
+        earlier = state[0].copy()
         for k, step in enumerate(steps):
             compression = compress(
                 state[0],
@@ -174,7 +174,7 @@ class GroundSolver:
         if contact.compression is not None and compacted is not None:
             contact.compression.write(imprints.window, (state[0] - compacted)[None])
         if self.weathered:
-            self.weathered.press(imprints.window, state[0] - found)
+            self.weathered.press(imprints.window, state[0] - earlier)
         whole[0] -= lowered
         self.state.write(window, whole)
         contact.add_loads(imprints, first, last)
@@ -199,16 +199,16 @@ class GroundSolver:
         if contact.met is None:
             contact.level = self.weathered.level(before)
         contact.met = imprints
-        found = self.weathered.met(self.state, imprints, contact.level, before, timing.frame_step)
-        change = quantised(found) - quantised(self.state.read(imprints.window))
-        self.state.write(imprints.window, found)
+        met = self.weathered.met(self.state, imprints, contact.level, before, timing.frame_step)
+        change = quantised(met) - quantised(self.state.read(imprints.window))
+        self.state.write(imprints.window, met)
         if change.any():
             if contact.recorder is None:
                 contact.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
             self._record(contact.recorder, before, imprints.window, change, np.zeros(change.shape[1:], bool))
 
     def _lowered(self, window: Window, contact: OpenContact) -> Array | float:
-        """How much less than its depth below open ground each trodden cell of a window is recorded as [m]."""
+        """Depth below open ground that is not recorded, for each trodden cell of a window [m]."""
         return self.weathered.trodden(window) * contact.level if self.weathered else 0.0
 
     def _record(

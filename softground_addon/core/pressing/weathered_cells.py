@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 
 
 class WeatheredCells:
-    """What weather needs to know of a ground that is pressed.
+    """Facts of a pressed ground that weather needs.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class WeatheredCells:
         return self._weathering.level(frame)
 
     def met(self, ground: HeightField, imprints: Imprints, level: float, frame: float, frame_step: float) -> Array:
-        """What a contact finds as it begins: compression and rim, (2, rows, columns), as they are recorded [m].
+        """Compression and rim that a contact begins on, (2, rows, columns), as they are recorded [m].
 
         Parameters
         ----------

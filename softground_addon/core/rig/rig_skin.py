@@ -30,7 +30,7 @@ _WELD = 1e-5
 
 @dataclass(frozen=True)
 class Shape:
-    """What a keyed shape adds to a skin at a value of 1.
+    """Offsets that a keyed shape adds to a skin at a value of 1.
 
     Attributes
     ----------
@@ -228,7 +228,7 @@ def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
 
 
 def _beside(skin: RigSkin, parts: Indices) -> NDArray[np.bool_]:
-    """Which of some parts lie against each other at rest: boxes around them touch."""
+    """Pairs of parts that lie against each other at rest: boxes around them touch."""
     corners = [(lie.min(axis=0), lie.max(axis=0)) for lie in (skin.vertices[skin.part == part] for part in parts)]
     low, high = np.swapaxes(corners, 0, 1)
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=-1)

@@ -40,7 +40,7 @@ def skin_mass(skin: RigSkin, bones: RigBones, pose: Recording) -> Slices[float]:
 
 
 def centre_of_volume(skin: RigSkin, bones: RigBones, recording: Recording) -> Array:
-    """Where the middle of a body's volume is over time, (F, 3) [m].
+    """Centre of a body's volume over time, (F, 3) [m].
 
     The skin of each bone encloses cones around its middle: what is missing where it goes on under the next bone is
     small, and as much is missing on the other side.

@@ -142,7 +142,7 @@ def friction_velocity(wind: Any) -> Any:
 
 
 def blown_flux(wind: Any, threshold: float) -> Any:
-    """What a wind [m/s] carries across each metre [kg/(m s)]: nothing below a friction velocity (Bagnold 1941)."""
+    """Transport by a wind [m/s] across each metre [kg/(m s)]: nothing below a friction velocity (Bagnold 1941)."""
     speed = friction_velocity(wind)
     return BAGNOLD * AIR_DENSITY / GRAVITY * speed * speed * speed * np.greater(speed, threshold)
 
@@ -235,7 +235,7 @@ class Matter:
 
 
 def matter_of(surface: str, layer_depth: float, section: float) -> Matter:
-    """How a surface takes weather; `layer_depth` of its loose layer [m]."""
+    """Response of a surface to weather; `layer_depth` of its loose layer [m]."""
     of = surfaces.find(surface)
     depth = layer_depth if of.melts else 0.0
     return Matter(depth, of.density, of.drifts_from, of.soaking, section, of.wet, of.pales)
