@@ -18,7 +18,6 @@ frames = [1001, 1120]
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import tomllib
@@ -30,38 +29,11 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.files.files import identity, read_regular
-
-LONGEST_NAME = 150
-"""Most bytes of a shot's name in UTF-8: file systems take 255, of which the names of partial files need some."""
-
-_WINDOWS = os.name == "nt"
-
-_NOT_IN_NAMES = "/\\"
-"""Letters that no part of a file's name may have."""
-
-_NOT_ON_WINDOWS = re.compile(
-    r"""
-    .* [\x00-\x1f<>:"|?*] .*          # a colon would even hide the file within another
-    | .* [.\ ]                        # left out of the name: 'a.' would be the same file as 'a'
-    | (con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) \ * (\..*)?  # devices, whatever follows the dot
-    """,
-    re.VERBOSE | re.IGNORECASE | re.DOTALL,
-)
-"""Names that Windows takes for another file's or a device's.
-
-References
-----------
-Microsoft, "Naming Files, Paths, and Namespaces".
-"""
+from .manifest_values import flat, frames_in, is_number, name_in, path_in, preset_in, text_in
 
 LARGEST = 2**24
 """Size of a manifest that is read [bytes]: a hundred thousand shots."""
 
-DEEPEST = 10
-"""Most tables within each other below `set`; settings lie three deep."""
-
-FRAME_LIMIT = 1_048_574
-"""Largest frame number that Blender takes, and minus the smallest."""
 
 MOST_LOOKED_AT = 100_000
 """Most files and folders that the pattern of one shot may go through: a disk has millions, and a loop no end."""
@@ -226,17 +198,6 @@ def chosen(shots: tuple[BatchShot, ...], wanted: list[str]) -> tuple[BatchShot, 
     return tuple(shots[number] for number in sorted({numbers[name] for name in wanted}))
 
 
-def frame_range(text: str) -> tuple[int, int]:
-    """First and last frame from a text such as 1-250; ValueError for any other."""
-    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
-    if not match:
-        raise ValueError(f"'{text}' is not a frame range such as 1-250")
-    first, last = int(match[1]), int(match[2])
-    if max(abs(first), abs(last)) > FRAME_LIMIT:
-        raise ValueError(f"'{text}' is not a frame range: frames go from {-FRAME_LIMIT:,} to {FRAME_LIMIT:,}")
-    return first, last
-
-
 def is_file(path: Path) -> bool:
     """True if the file exists; False also for names that no file can have."""
     try:
@@ -251,11 +212,11 @@ def _shots(entry: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, 
             f"{where}: give either 'file', one .blend file, or 'files', a pattern such as \"shots/*.blend\"."
         )
     if "file" in entry:
-        yield _shot(entry, defaults, folder / _text(entry["file"], f"{where}: 'file'"), folder, where)
+        yield _shot(entry, defaults, folder / text_in(entry["file"], f"{where}: 'file'"), folder, where)
         return
     if "name" in entry:
         raise InputError(f"{where}: a pattern's shots are named after their files; leave 'name' out.")
-    pattern = _text(entry["files"], f"{where}: 'files'")
+    pattern = text_in(entry["files"], f"{where}: 'files'")
     matches = sorted(set(_fitting(folder, pattern, where)))
     if not matches:
         raise InputError(f"{where}: no file fits the pattern {pattern!r} in '{folder}'.")
@@ -304,20 +265,20 @@ def _fitting(folder: Path, pattern: str, where: str) -> Iterator[Path]:
 
 
 def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, folder: Path, where: str) -> BatchShot:
-    name = _name(entry.get("name", file.stem), where)
-    file = _path(str(file), folder, f"{where}: 'file'")
+    name = name_in(entry.get("name", file.stem), where)
+    file = path_in(str(file), folder, f"{where}: 'file'")
     where = f"{where} ({name})"
     given = {key: entry[key] for key in _FROM_DEFAULTS if key in entry}
     # a destination of the shot overrides both kinds of default
     destination = () if "save" not in given and "in_place" not in given else ("save", "in_place")
     values = {key: value for key, value in defaults.items() if key not in destination} | given
-    overrides = dict(_flat(defaults.get("set", {}), f"{where}: 'set'"))
-    overrides |= dict(_flat(entry.get("set", {}), f"{where}: 'set'"))
+    overrides = dict(flat(defaults.get("set", {}), f"{where}: 'set'"))
+    overrides |= dict(flat(entry.get("set", {}), f"{where}: 'set'"))
     in_place = values.get("in_place", False)
     if not isinstance(in_place, bool):
         raise InputError(f"{where}: 'in_place' must be true or false.")
     edits, save, report = (
-        _path(_text(values[key], f"{where}: '{key}'").replace("{name}", name), folder, f"{where}: '{key}'")
+        path_in(text_in(values[key], f"{where}: '{key}'").replace("{name}", name), folder, f"{where}: '{key}'")
         if key in values
         else None
         for key in ("edits", "save", "report")
@@ -329,14 +290,14 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
     if save == file:
         raise InputError(f"{where}: 'save' is the shot itself: say in_place = true to replace it.")
     cell_size = values.get("cell_size")
-    if cell_size is not None and not _is_number(cell_size):
+    if cell_size is not None and not is_number(cell_size):
         raise InputError(f"{where}: 'cell_size' is {cell_size!r}; it must be a number of metres.")
     return BatchShot(
         name=name,
         file=file,
-        scene=_text(values["scene"], f"{where}: 'scene'") if "scene" in values else "",
-        preset=_preset(values.get("preset", ""), folder, where),
-        frames=_frames(values["frames"], where) if "frames" in values else None,
+        scene=text_in(values["scene"], f"{where}: 'scene'") if "scene" in values else "",
+        preset=preset_in(values.get("preset", ""), folder, where),
+        frames=frames_in(values["frames"], where) if "frames" in values else None,
         cell_size=None if cell_size is None else float(cell_size),
         settings=tuple(overrides.items()),
         edits=edits,
@@ -407,75 +368,3 @@ def _check_names(shots: Iterable[BatchShot], origin: str) -> None:
         if shot.name.casefold() in names:
             raise InputError(f"{origin}: two shots are named '{shot.name}': give each a 'name' of its own.")
         names.add(shot.name.casefold())
-
-
-def _name(value: object, where: str) -> str:
-    name = _text(value, f"{where}: 'name'")
-    if name in (".", "..") or set(name) & set(_NOT_IN_NAMES) or len(name.encode()) > LONGEST_NAME:
-        raise InputError(
-            f"{where}: the name {name!r} cannot be part of a file's name: give a 'name' without any of {_NOT_IN_NAMES} "
-            f"and of at most {LONGEST_NAME} bytes."
-        )
-    if _WINDOWS and _NOT_ON_WINDOWS.fullmatch(name):
-        raise InputError(
-            f"{where}: the name {name!r} cannot be part of a file's name on Windows: give a 'name' without any of "
-            '<>:"|?*, that does not end with a dot or a space and is no device such as CON.'
-        )
-    return name
-
-
-def _text(value: object, where: str) -> str:
-    if not isinstance(value, str) or not value.strip() or "\0" in value:
-        raise InputError(f"{where} is {value!r}; it must be text.")
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise InputError(f"{where} is {value!r}, which is not Unicode text: rename the file.") from None
-    return value
-
-
-def _path(value: object, folder: Path, where: str) -> Path:
-    return Path(os.path.realpath(folder / _text(value, where)))
-
-
-def _preset(value: object, folder: Path, where: str) -> str:
-    if value == "":
-        return ""
-    name = _text(value, f"{where}: 'preset'")
-    return str(_path(name, folder, where)) if name.lower().endswith(".json") else name
-
-
-def _frames(value: object, where: str) -> tuple[int, int]:
-    if (
-        not isinstance(value, list)
-        or len(value) != 2
-        or not all(isinstance(frame, int) and not isinstance(frame, bool) for frame in value)
-        or not all(abs(frame) <= FRAME_LIMIT for frame in value)
-        or value[0] >= value[1]
-    ):
-        raise InputError(f"{where}: 'frames' is {value!r}; it must be the first and the last frame, such as [1, 250].")
-    return value[0], value[1]
-
-
-def _flat(table: object, where: str, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Nested tables as paths and values: {"material": {"layer_depth": 0.4}} is material.layer_depth = 0.4."""
-    if not isinstance(table, dict):
-        raise InputError(f'{where} must be a table such as {{ "material.layer_depth" = 0.4 }}.')
-    for key, value in table.items():
-        path = _text(f"{prefix}{key}", where).strip()
-        if isinstance(value, dict):
-            if path.count(".") >= DEEPEST:
-                raise InputError(f"{where}: '{path}' is a table within more than {DEEPEST} others.")
-            yield from _flat(value, where, f"{path}.")
-        elif isinstance(value, bool):
-            yield path, str(value).lower()
-        elif isinstance(value, str):
-            yield path, _text(value, f"{where}: '{path}'").strip()
-        elif _is_number(value):
-            yield path, repr(value)
-        else:
-            raise InputError(f"{where}: '{path}' is {value!r}; it must be a number, true or false, or a text.")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -138,14 +138,14 @@ def test_a_broken_manifest_is_refused_with_the_place_and_what_is_wrong(text, say
 def test_on_windows_a_name_is_refused_whose_files_would_be_others_or_devices(monkeypatch, name):
     text = f"[[shots]]\nfile = 'a.blend'\nin_place = true\nname = {json.dumps(name)}"
     assert parse(text)[0].name == name
-    monkeypatch.setattr("softground_addon.batch.manifest._WINDOWS", True)
+    monkeypatch.setattr("softground_addon.batch.manifest_values._WINDOWS", True)
     with pytest.raises(InputError, match="cannot be part of a file's name on Windows"):
         parse(text)
 
 
 @pytest.mark.parametrize("name", ["010", "bog.v2", "console", "auxiliary", "com10", "a con", ".hidden", "x" * 150])
 def test_on_windows_other_names_are_taken(monkeypatch, name):
-    monkeypatch.setattr("softground_addon.batch.manifest._WINDOWS", True)
+    monkeypatch.setattr("softground_addon.batch.manifest_values._WINDOWS", True)
     assert parse(f"[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '{name}'")[0].name == name
 
 

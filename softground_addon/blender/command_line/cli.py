@@ -29,6 +29,7 @@ from ..output import export_formats
 from ..response import response_job
 from ..settings import user_folder
 from . import cli_arguments, program
+from .saving import check_places, files_read, save_copy, save_target
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 
@@ -141,10 +142,10 @@ def _bake(options: argparse.Namespace) -> None:
         raise InputError("Nothing would be kept: give --save FILE.blend, --in-place, --report FILE.json or --dry-run.")
     if options.blend is not None:
         _open(options.blend)
-    read = receipts.checksums(_files_read(options)) if options.receipt else {}
+    read = receipts.checksums(files_read(options)) if options.receipt else {}
     scene = _scene(options.scene)
-    target = _save_target(options)
-    _check_places(options, target)
+    target = save_target(options)
+    check_places(options, target)
     edits = _edits(options.edits) if options.edits else None
     set_up_automatically(scene)
     if options.preset:
@@ -177,8 +178,8 @@ def _clean(options: argparse.Namespace) -> None:
     if options.blend is not None:
         _open(options.blend)
     scene = _scene(options.scene)
-    target = _save_target(options)
-    _check_places(options, target)
+    target = save_target(options)
+    check_places(options, target)
     set_up_automatically(scene)
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
@@ -187,7 +188,7 @@ def _clean(options: argparse.Namespace) -> None:
     content = cleaned.as_dict() | {"root_motion": {travel.character: travel.as_dict() for travel in travels}}
     with contextlib.ExitStack() as results:
         if target:
-            _save_copy(results.enter_context(files.replacing(target)))
+            save_copy(results.enter_context(files.replacing(target)))
         if options.report:
             path = results.enter_context(files.replacing(Path(os.path.realpath(options.report))))
             path.write_bytes(report.dump(content).encode())
@@ -233,17 +234,6 @@ def _ending_with(parent: int, show: Callable[[jobs.Progress], None]) -> Callable
     return shown
 
 
-def _files_read(options: argparse.Namespace) -> list[Path]:
-    """The opened file, the files that it links, and the preset file."""
-    linked = [(item.filepath, item.library) for item in (*bpy.data.libraries, *bpy.data.cache_files)]
-    paths = [bpy.path.abspath(path, library=library) for path, library in linked]
-    if options.preset and options.preset.lower().endswith(".json"):
-        paths.append(options.preset)
-    if options.edits:
-        paths.append(str(options.edits))
-    return [Path(os.path.realpath(path)) for path in (bpy.data.filepath, *paths) if path]
-
-
 def _write_results(
     options: argparse.Namespace, target: Path | None, content: dict[str, Any], read: dict[str, str]
 ) -> None:
@@ -253,7 +243,7 @@ def _write_results(
         wrote: dict[Path, Path] = {}
         if target and not options.dry_run:
             wrote[target] = results.enter_context(files.replacing(target))
-            _save_copy(wrote[target])
+            save_copy(wrote[target])
         if options.report:
             path = Path(os.path.realpath(options.report))
             wrote[path] = results.enter_context(files.replacing(path))
@@ -314,30 +304,6 @@ def _preset(name_or_path: str) -> presets.Preset:
     )
 
 
-def _save_target(options: argparse.Namespace) -> Path | None:
-    """File that the shot is saved to."""
-    if options.in_place:
-        if not bpy.data.filepath:
-            raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
-        return Path(os.path.realpath(bpy.data.filepath))
-    return options.save.resolve() if options.save else None
-
-
-def _check_places(options: argparse.Namespace, target: Path | None) -> None:
-    """Raise InputError unless all results can be written, each to a place of its own, and over no file that is read."""
-    places = [Path(os.path.realpath(path)) for path in (target, options.report, options.receipt) if path]
-    named, read = map(files.identity, places), set(map(files.identity, _files_read(options)))
-    opened = files.identity(Path(bpy.data.filepath)) if bpy.data.filepath else None
-    taken: set[str] = set()
-    for path, name in zip(places, named, strict=True):
-        files.check_place(path)
-        if name in taken:
-            raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
-        if name in read and not (path == target and name == opened):
-            raise InputError(f"'{path}' is read by this bake and would be overwritten: write to another file.")
-        taken.add(name)
-
-
 def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
     """This bake as an entry of a manifest."""
     return BatchShot(
@@ -353,30 +319,6 @@ def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
         in_place=options.in_place,
         report=Path(os.path.realpath(options.report)) if options.report else None,
     )
-
-
-def _save_copy(path: Path) -> None:
-    """Save the open file under `path`, compressed if the opened file was.
-
-    Raises
-    ------
-    InputError
-        If it could not be written.
-    OSError
-        If the disk is full.
-    """
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=_is_compressed(bpy.data.filepath))
-    except RuntimeError as error:
-        files.check_not_full(path)  # Blender may say "No such file" then
-        raise InputError(f"The baked shot could not be saved: {str(error).strip()}") from None
-
-
-def _is_compressed(path: str) -> bool:
-    if not path or not Path(path).is_file():
-        return False
-    with Path(path).open("rb") as blend:
-        return blend.read(7) != b"BLENDER"
 
 
 class _Plain:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...batch import command
-from ...batch.manifest import frame_range
+from ...batch.manifest_values import frame_range
 from ..output import export_formats
 
 

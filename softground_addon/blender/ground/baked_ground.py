@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.manifest import FRAME_LIMIT
+from ...batch.manifest_values import FRAME_LIMIT
 from ...core.errors import InputError
 from ...core.events.events import Event, as_edited
 from ...core.ground.material import MATERIAL_RANGES, OFF

@@ -7,21 +7,21 @@ from typing import Any, cast
 import bpy
 
 from .. import node_modifiers
-from . import own_data, playback, weather_table
+from . import own_data, playback, weather_inputs, weather_table
 from . import weather_nodes as nodes
 
-MODIFIER = nodes.GROUP
+MODIFIER = weather_inputs.GROUP
 
 
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     """The ground's weather, whatever the names of the modifier and its node group have become."""
-    modifier: bpy.types.Modifier | None = node_modifiers.modifier_with(ground, nodes.is_weather)
+    modifier: bpy.types.Modifier | None = node_modifiers.modifier_with(ground, weather_inputs.is_weather)
     return modifier
 
 
 def inputs_of(modifier: Any) -> dict[str, str]:
     """Identifier of each of the inputs that set the weather, by its name."""
-    known = {name for name, *_ in nodes.INPUTS}
+    known = {name for name, *_ in weather_inputs.INPUTS}
     return {name: identifier for name, identifier in node_modifiers.inputs_of(modifier).items() if name in known}
 
 
@@ -66,7 +66,8 @@ def remove(ground: bpy.types.Object) -> None:
 
 def remove_unused() -> None:
     """Remove the groups that no modifier has any more."""
-    for group in [item for item in bpy.data.node_groups if nodes.is_weather(item) and not (item.users or item.library)]:
+    groups = [group for group in bpy.data.node_groups if weather_inputs.is_weather(group)]
+    for group in [group for group in groups if not (group.users or group.library)]:
         inner = nodes.within(group)
         bpy.data.node_groups.remove(group)
         if inner and not inner.users:

@@ -21,7 +21,7 @@ from ...core.weather.weather import Matter, Span, matter_of, moment_of, span_of
 from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
 from .. import compat, jobs, settings
 from ..ground import baked_ground, ground_mesh
-from ..playback import own_data, weather_modifier, weather_table
+from ..playback import own_data, weather_inputs, weather_modifier, weather_table
 from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
@@ -75,7 +75,7 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     existing: Any = weather_modifier.modifier_of(display_mesh)
     if existing:
         weather_modifier.separate(existing)
-    tree = existing.node_group if existing else nodes.new()
+    tree = existing.node_group if existing else weather_inputs.new()
     try:
         _fit(ground, display_mesh, tree, footprints, about, places)
     except BaseException:
@@ -106,7 +106,7 @@ def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecor
 
 def set_preset(modifier: Any, preset: str) -> None:
     """Set all inputs of a weather modifier as one of `PRESETS` has them."""
-    _set(modifier, {**{name: value for name, value, *_ in nodes.INPUTS}, **PRESETS[preset][1]})
+    _set(modifier, {**{name: value for name, value, *_ in weather_inputs.INPUTS}, **PRESETS[preset][1]})
 
 
 def _set(modifier: Any, values: Mapping[str, float]) -> None:

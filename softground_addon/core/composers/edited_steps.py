@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
+from functools import reduce
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,21 +18,21 @@ from ..errors import InputError
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
-from ..numerics.cell_keys import ROW, Keys, among
+from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
-from ..pressing.ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
+from ..pressing.ground_cells import GroundCells, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
 from ..pressing.sole_layout import SoleLayout
 from ..pressing.sole_points import SolePoints, sole_points
 from ..pressing.solver import GroundSolver
-from ..record.contact_steps import Steps
 from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
-from ..record.footprints import QUANTUM, Changes, Footprint
+from ..record.footprints import Footprint
 from ..record.mesh_sole import MeshSole
 from ..record.record import BakeRecord
 from .edited_contacts import edited_contact
+from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
 
 Array = NDArray[np.float64]
 Change = tuple[int, StepEdit]
@@ -98,9 +98,9 @@ class EditedSteps:
         self._feet = feet(footprints)
         self._points: dict[tuple[int | MeshSole, float], SolePoints] = {}
         """Of soles and their scales."""
-        self._layouts: dict[Change, _Layout] = {}
+        self._layouts: dict[Change, Layout] = {}
         """Of the group that was pressed last: they take memory."""
-        self._unpacked: dict[int, _Baked] = {}
+        self._unpacked: dict[int, ReplayedStep] = {}
         """Prints around the steps that were pressed last, which a step that is dragged meets again and again."""
         self._known: dict[frozenset[Change], _Group] = {}
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
@@ -203,7 +203,7 @@ class EditedSteps:
         """Steps that press cells at a frame or later."""
         if not len(cells):
             return []
-        column, row, columns, rows = _window_of(cells).expanded(self._weather_reach)
+        column, row, columns, rows = window_of(cells).expanded(self._weather_reach)
         low, size = self._windows[:, :2], self._windows[:, 2:]
         near = (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
         near &= self._frames[:, 1] >= since
@@ -223,8 +223,8 @@ class EditedSteps:
         """The cells that a print depends on."""
         if self._ground.weathering or self._ground.material.repose_angle:
             window = footprint.window.expanded(self._weather_reach)
-            return _keys(window, np.arange(window.cells))
-        return _keys(footprint.window, footprint.contact_cells[:])
+            return keys_of_cells(window, np.arange(window.cells))
+        return keys_of_cells(footprint.window, footprint.contact_cells[:])
 
     def _changed_cells(self, number: int, after: Footprint | None) -> Keys:
         """Cells in which the print of a step differs visibly from that of the bake."""
@@ -233,7 +233,7 @@ class EditedSteps:
         window = window.union(after.window) if after else window
         difference = np.zeros((2 if either else 1, window.rows, window.columns))
         if before is not None:
-            unpacked = self._unpacked.get(number) or _Baked(before)
+            unpacked = self._unpacked.get(number) or ReplayedStep(before)
             for of_quantity, quantity in zip(difference, ("compression", "rim"), strict=False):
                 of_quantity[window.slices(before.window)] -= getattr(unpacked, quantity)
         if after is not None:
@@ -243,8 +243,8 @@ class EditedSteps:
         if self._ground.weathering and not _at_once(before, after):  # of other age, whatever its depth
             for footprint in (before, after):
                 if footprint is not None:
-                    differs[window.slices(footprint.window)] |= _changed_by(footprint)
-        return _keys(window, np.flatnonzero(differs))
+                    differs[window.slices(footprint.window)] |= changed_by(footprint)
+        return keys_of_cells(window, np.flatnonzero(differs))
 
     def _press(self, members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
         """The prints of some steps, on what all others leave."""
@@ -255,9 +255,9 @@ class EditedSteps:
             prints |= yield from self._run(layouts, members)
         return prints
 
-    def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
+    def _run(self, laid: Mapping[int, Layout], members: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
         layouts = {n: item.layout for n, item in laid.items()}
-        grid = _grid(self._baked(next(iter(layouts))))
+        grid = grid_of(self._baked(next(iter(layouts))))
         start = min(layout.first for layout in layouts.values())
         end = max(layout.end for layout in layouts.values())
         others = self._others(layouts, members, grid.frame(grid.number(end - 1)))
@@ -283,7 +283,7 @@ class EditedSteps:
 
     def _others(
         self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit], end: float
-    ) -> list[_Baked]:
+    ) -> list[ReplayedStep]:
         """The prints around some steps that stay as they were baked."""
         windows = [layout.window(self._cells).expanded(self._margin) for layout in layouts.values()]
         low, size = self._windows[:, :2], self._windows[:, 2:]
@@ -292,12 +292,12 @@ class EditedSteps:
             near |= (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
         near &= self._frames[:, 0] <= end
         around = np.flatnonzero(near).tolist()
-        self._unpacked = {n: self._unpacked.get(n) or _Baked(self._footprints[n]) for n in around}
+        self._unpacked = {n: self._unpacked.get(n) or ReplayedStep(self._footprints[n]) for n in around}
         return [baked for n, baked in self._unpacked.items() if n not in members]
 
-    def _layout(self, change: Change) -> _Layout:
+    def _layout(self, change: Change) -> Layout:
         if change not in self._layouts:
-            self._layouts[change] = _Layout(self._laid_out(self._baked(change[0]), change[1]))
+            self._layouts[change] = Layout(self._laid_out(self._baked(change[0]), change[1]))
         return self._layouts[change]
 
     def _laid_out(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
@@ -308,7 +308,7 @@ class EditedSteps:
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
                 "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again."
             )
-        steps = _grid(footprint).shifted(baked.steps(footprint.load_frames), edit.shift_frames)
+        steps = grid_of(footprint).shifted(baked.steps(footprint.load_frames), edit.shift_frames)
         other = sole_of(edit, baked.pressing, self._feet)
         pressing, steps = edited_contact(baked.pressing, steps, other, edit, footprint.position, self._ground.terrain)
         sole, strength = pressing.sole, edit.strength
@@ -330,14 +330,6 @@ class EditedSteps:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
-    """A contact to be pressed, and what was laid out of it, which is the same whatever lies there."""
-
-    layout: ContactLayout
-    imprints: dict[tuple[int, int], Imprints] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
 class _Group:
     """Steps that were edited, with those that meet them, the cells that each changed visibly, their window, and which
     other groups meet them, as far as that was asked."""
@@ -347,111 +339,6 @@ class _Group:
     changed: dict[int, Keys]
     window: Window
     meets: WeakKeyDictionary[_Group, bool] = field(default_factory=WeakKeyDictionary)
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """The steps of a simulation, and the frames that are recorded of it.
-
-    Attributes
-    ----------
-    timing : Timing
-    begin : float
-        Scene frame of step 0.
-    """
-
-    timing: Timing
-    begin: float
-
-    def number(self, step: int) -> int:
-        """The recorded frame that a step belongs to, in a row from that of step 0."""
-        return -(-step // self.timing.steps_per_frame)
-
-    def frame(self, number: int) -> float:
-        """Its scene frame."""
-        return self.begin + number * self.timing.frame_step
-
-    def steps(self, number: int) -> range:
-        """The steps up to it, after the one before."""
-        per_frame = self.timing.steps_per_frame
-        return range((number - 1) * per_frame + 1, number * per_frame + 1)
-
-    def shifted(self, steps: Steps, frames: int) -> Steps:
-        """The steps so many scene frames later, or as near to that as the recorded frames allow."""
-        by = round(frames / self.timing.frame_step)
-        first = steps.first + by * self.timing.steps_per_frame
-        return replace(steps, first=first, frames=steps.frames + by * self.timing.frame_step)
-
-
-def _grid(footprint: Footprint) -> _Grid:
-    baked, frames = footprint.pressed_by, footprint.load_frames
-    assert baked is not None
-    per_frame = max(1, round(footprint.frame_step / footprint.load_spacing))
-    begin = frames[0] - baked.first * footprint.frame_step / per_frame
-    whole = float(np.rint(begin))
-    timing = Timing(baked.time_step, per_frame, footprint.frame_step)
-    return _Grid(timing, whole if abs(begin - whole) < 1e-3 else float(begin))
-
-
-class _Baked:
-    """A print as it was baked, frame by frame; what is looked at of it is unpacked once."""
-
-    def __init__(self, footprint: Footprint) -> None:
-        self._footprint = footprint
-
-    @cached_property
-    def compression(self) -> Array:
-        """All that it compressed, (rows, columns) of its window [m]."""
-        return self._footprint.tile(self._footprint.compression)
-
-    @cached_property
-    def rim(self) -> Array:
-        """All that it raised, (rows, columns) of its window [m]."""
-        return self._footprint.tile(self._footprint.rim)
-
-    @cached_property
-    def _pressing(self) -> Changes:
-        return self._footprint.pressing
-
-    @cached_property
-    def _changes(self) -> list[tuple[Array, NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]]:
-        both = (self._footprint.compression, self._footprint.rim)
-        return [(change.frames, change.first, change.cells, change.amounts) for change in both]
-
-    def replay(self, solver: GroundSolver, since: float, frame: float) -> None:
-        """Change a ground as it did after one recorded frame, up to another."""
-        window = self._footprint.window
-        during = [slice(*np.searchsorted(frames, (since + 1e-6, frame + 1e-6))) for frames, *_ in self._changes]
-        if any(part.start < part.stop for part in during):
-            solver.state.write(window, solver.state.read(window) + self._sum(during))
-        if weathered := solver.weathered:
-            weathered.note(*self._known(frame))
-            after, before = (self._footprint.tile(self._pressing, time + 1e-6) for time in (frame, since))
-            weathered.press(window, after - before)
-
-    def _known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
-        """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""
-        footprint, window = self._footprint, self._footprint.window
-        last, touched = np.full(window.cells, -np.inf), np.zeros(window.cells, bool)
-        for frames, first, cells, _ in self._changes:
-            count = int(np.searchsorted(frames, frame + 1e-6))
-            np.maximum.at(last, cells[: first[count]], np.repeat(frames[:count], np.diff(first[: count + 1])))
-            if count:
-                touched[footprint.contact_cells[:]] = True
-        cells, start, end = footprint.contact_cells[:], footprint.contact_start[:], footprint.contact_end[:]
-        by_now = start <= frame + 1e-6
-        last[cells[by_now]] = np.maximum(last[cells[by_now]], np.minimum(end[by_now], frame))
-        shape = (window.rows, window.columns)
-        return window, last.reshape(shape), touched.reshape(shape)
-
-    def _sum(self, during: Sequence[slice]) -> Array:
-        """What it changed in some of its recorded frames, (2, rows, columns) [m]."""
-        window = self._footprint.window
-        sums = []
-        for part, (_, first, cells, amounts) in zip(during, self._changes, strict=True):
-            within = slice(first[part.start], first[part.stop])
-            sums.append(np.bincount(cells[within], amounts[within], window.cells))
-        return np.asarray(np.stack(sums).reshape(2, window.rows, window.columns) * QUANTUM)
 
 
 def _near(groups: Sequence[_Group]) -> Iterable[tuple[_Group, _Group]]:
@@ -471,26 +358,3 @@ def _at_once(footprint: Footprint | None, other: Footprint | None) -> bool:
     if footprint is None or other is None:
         return False
     return abs(footprint.start_frame - other.start_frame) + abs(footprint.end_frame - other.end_frame) < _SAME_TIME
-
-
-def _changed_by(footprint: Footprint) -> NDArray[np.bool_]:
-    """The cells that a print changed or touched, (rows, columns) of its window."""
-    window = footprint.window
-    changed = np.zeros(window.cells, bool)
-    for cells in (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells):
-        changed[cells[:]] = True
-    return changed.reshape(window.rows, window.columns)
-
-
-def _keys(window: Window, cells: NDArray[np.integer]) -> Keys:
-    """Keys of cells of a window, ascending."""
-    row, column = np.divmod(cells.astype(np.int64), window.columns)
-    keys: Keys = (row + window.row) * ROW + column + window.column
-    return keys
-
-
-def _window_of(keys: Keys) -> Window:
-    row = (keys + ROW // 2) // ROW
-    column = keys - row * ROW
-    low = int(column.min()), int(row.min())
-    return Window(*low, int(column.max()) - low[0] + 1, int(row.max()) - low[1] + 1)

@@ -10,17 +10,14 @@ distance from the middle.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..events import phases
-from ..events.phases import Phase
 from ..ground import crumbs, surfaces
 from ..ground.surfaces import ThrownMatter
-from ..loads.estimate import CharacterLoads
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
@@ -46,21 +43,12 @@ CARRIED_ALONG = 0.5
 """Share of the sole's speed that what it throws takes along."""
 PUSH_DEPTH = 2e-3
 """Thickness of the ground that a sole drags off which pushes or slides harder than the ground can bear [m]."""
-PUSHING = 0.25
-"""Time before a sole leaves in which it pushes off [s]."""
-PRESSED = 0.1
-"""Below this load the direction of an estimated force tells nothing, in body weights: both its parts are what the
-low-pass leaves."""
 PUSH_SPEED, PUSH_ANGLES = 0.7, (30.0, 50.0)
 """Speed of what it throws over its own, and between which angles [deg]."""
-SHEDDING = 0.2
-"""Time in which a sole sheds what it carries, but for 1/e [s]."""
 SHED_SCATTER = 0.15
 """How much the speed of what is shed varies in each direction, over that of the sole."""
 LUMP = 0.01
 """How far from the middle of a lump its pieces are at most, along each axis [m]."""
-LONGEST_SHED = 0.6
-"""After that it is clean [s]."""
 LARGEST_SHARE = 0.25
 """Of what a step throws in one phase, in its largest piece."""
 ALL_PIECES = 250_000
@@ -69,8 +57,6 @@ TOGETHER = 20_000
 """Whose landings are computed in one slice at most."""
 MOST_SHED = 1000
 """That a sole sheds."""
-LANDING_TIME = 0.1
-"""What is compressed within this time after the strike is compressed by the landing [s, of an adult]."""
 BREADTH = 0.3
 """Breadth of what a foot sheds from, over the length between its landmarks: these lie along its middle."""
 
@@ -134,32 +120,6 @@ def thrown_share(speed: float, radius: float, gravity: float) -> float:
     [0.0, 0.179, 0.3]
     """
     return float(np.clip(THROWN_SHARE * (speed**2 / (gravity * radius) - 1.0), 0.0, MOST_THROWN))
-
-
-@sliced
-def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], *, surface: str) -> Slices[list[Throw]]:
-    """How the steps of a bake throw.
-
-    Parameters
-    ----------
-    loads : sequence of CharacterLoads
-    footprints : sequence of Footprint
-        That they left.
-    surface : str
-    """
-    throws: list[Throw] = []
-    for character in loads:
-        of_character = phases.phases(character)
-        sliding = np.zeros(character.contacts.touching.shape, bool)
-        for phase in of_character:
-            if phase.kind == "slide_start":
-                sliding[phase.first : phase.last, phase.sole] = True
-        for phase in of_character:
-            yield
-            number = _footprint_of(character, phase, footprints)
-            if number is not None:
-                throws += _throws(character, phase, number, surfaces.find(surface).thrown, sliding)
-    return throws
 
 
 @sliced
@@ -236,81 +196,6 @@ def throw(
     return (yield from _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None))
 
 
-def _throws(
-    loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter, sliding: NDArray[np.bool_]
-) -> Iterator[Throw]:
-    motion, step = loads.motion, loads.motion.time_step
-    if phase.kind in ("heel_strike", "land"):
-        speed = phases.landing_speed(loads, phase.sole, phase.at)
-        middle = phases.place_of(loads, phase.sole, phase.at)
-        along = phases.sole_velocity(loads, phase.sole, max(phase.at - 1, 0))
-        rows = np.concatenate([np.ones(1), np.zeros(3), middle, along])[None]
-        yield _throw(loads, phase, number, ThrowKind.LANDING, np.array([phase.at]), rows, speed)
-    if phase.kind == "slide_start":  # what slides under load has overcome what the ground can bear
-        steps = np.arange(phase.first, phase.last)
-        slid = phases.slide_speed(loads, phase.sole)[steps] * step
-        _, velocities = phases.sole_points_at(loads, phase.sole, steps)
-        aim = velocities.mean(axis=1) * (1.0, 1.0, 0.0)
-        aim /= np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-9)
-        yield _throw(loads, phase, number, ThrowKind.PUSH, steps, _rows(loads, phase.sole, steps, slid, aim))
-    if phase.kind == "toe_off":
-        steps = np.arange(max(0, phase.at - max(1, round(PUSHING / step))), phase.at)
-        slid = _slid(loads, phase, steps, matter) * ~sliding[steps, phase.sole]
-        if slid.any():
-            force = loads.forces.forces[steps, phase.sole, :2]
-            aim = np.zeros((len(steps), 3))
-            aim[:, :2] = -force / np.maximum(np.linalg.norm(force, axis=1), 1e-9)[:, None]
-            yield _throw(loads, phase, number, ThrowKind.PUSH, steps, _rows(loads, phase.sole, steps, slid, aim))
-        steps = np.arange(phase.at, min(len(motion.frames) - 1, phase.at + round(LONGEST_SHED / step)))
-        weights = np.exp(-(steps - phase.at) * step / SHEDDING) * step / SHEDDING
-        if len(steps):
-            rows = _rows(loads, phase.sole, steps, weights, np.zeros((len(steps), 3)))
-            yield _throw(loads, phase, number, ThrowKind.SHED, steps, rows)
-
-
-def _throw(
-    loads: CharacterLoads,
-    phase: Phase,
-    number: int,
-    kind: ThrowKind,
-    steps: NDArray[np.intp],
-    rows: Array,
-    speed: float = 0.0,
-) -> Throw:
-    motion = loads.motion
-    return Throw(
-        number,
-        phase.kind,
-        kind,
-        phases.is_foot(motion.soles[phase.sole]),
-        first=float(motion.frames[min(steps[0], len(motion.frames) - 1)]),
-        spacing=float(motion.frames[-1] - motion.frames[0]) / max(1, len(motion.frames) - 1),
-        speed=speed,
-        landed_by=float(motion.frames[min(phase.at, len(motion.frames) - 1)] + LANDING_TIME * motion.adult_second),
-        samples=rows.astype(np.float32),
-    )
-
-
-def _rows(loads: CharacterLoads, sole: int, steps: NDArray[np.intp], weights: Array, aim: Array) -> Array:
-    """Samples as `Throw` has them."""
-    followed = phases.sole_points_at(loads, sole, steps)
-    parts = (weights[:, None], aim, *(part.reshape(len(steps), -1) for part in followed))
-    return np.concatenate(parts, axis=1)
-
-
-def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Array:
-    """Slide of a sole in each step as it pushes along the ground harder than that can bear, (K,) [m].
-
-    Where it hardly presses, the direction of its force tells nothing.
-    """
-    normal, force = loads.contacts.normal[steps, phase.sole], loads.forces.forces[steps, phase.sole]
-    pressing = np.einsum("ni,ni->n", force, normal)
-    along = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
-    loaded = pressing > PRESSED * loads.motion.mass * loads.motion.gravity
-    slips = loaded & (along > np.tan(np.radians(matter.repose)) * pressing)
-    return np.asarray(phases.slide_speed(loads, phase.sole)[steps] * slips * loads.motion.time_step)
-
-
 def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float) -> float:
     """Volume thrown by a step that left a print [m³]."""
     amount = float(throw.samples[:, WEIGHT].astype(np.float64).sum())
@@ -320,19 +205,6 @@ def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float)
     if throw.kind == ThrowKind.PUSH:
         return np.sqrt(left.area_m2) / 2 * PUSH_DEPTH * amount
     return matter.film * left.area_m2 * amount
-
-
-def _footprint_of(loads: CharacterLoads, phase: Phase, footprints: Sequence[Footprint]) -> int | None:
-    """The footprint that a landing begins or a leaving ends."""
-    name, sole = loads.motion.name, loads.motion.soles[phase.sole].sole.name
-    frame = float(loads.motion.frames[min(phase.at, len(loads.motion.frames) - 1)])
-    near = [
-        (abs((footprint.end_frame if phase.kind == "toe_off" else footprint.start_frame) - frame), number)
-        for number, footprint in enumerate(footprints)
-        if (footprint.character, footprint.sole) == (name, sole)
-        and footprint.start_frame - 2 <= frame <= footprint.end_frame + 2
-    ]
-    return min(near)[1] if near else None
 
 
 def _radius(throw: Throw, left: Footprint) -> float:

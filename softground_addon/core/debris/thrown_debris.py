@@ -16,7 +16,8 @@ from ..numerics.slices import Slices, sliced, without_warnings
 from ..record.footprints import recompose
 from ..record.record import BakeRecord
 from . import flight
-from .debris import Debris, Height, sources, throw, throws_of, volumes
+from .debris import Debris, Height, sources, throw, volumes
+from .step_throws import throws_of
 
 Array = NDArray[np.float64]
 

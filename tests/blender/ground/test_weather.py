@@ -14,7 +14,7 @@ from softground_addon.blender import compat
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.output import exports
 from softground_addon.blender.panels import weather_panel
-from softground_addon.blender.playback import own_data, weather_modifier, weather_table
+from softground_addon.blender.playback import own_data, weather_inputs, weather_modifier, weather_table
 from softground_addon.blender.playback import weather_nodes as nodes
 from softground_addon.blender.weather import ground_weather as weather
 from softground_addon.blender.weather import weather_keys, weather_result
@@ -28,7 +28,7 @@ from tests.tiers import slow_but_one
 
 FRAMES = (1, 20, 34, 300)
 SOME = weathered_shots.SOME | {"Water Table": 2.0, "Halo": 0.8}
-DEFAULTS = {name: value for name, value, *_ in nodes.INPUTS}
+DEFAULTS = {name: value for name, value, *_ in weather_inputs.INPUTS}
 MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED, nodes.BLOWN)
 """What is not stored where the ground does not ask for it, and where there is no weather."""
 HOUR = 3600.0
@@ -399,7 +399,7 @@ def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
     assert {name: now[name] for name in kept} == kept
     bpy.ops.softground.remove_weather()
     assert contents(carrier(scene).data) == kept
-    assert not [group for group in bpy.data.node_groups if group.name.startswith(nodes.GROUP)]
+    assert not [group for group in bpy.data.node_groups if group.name.startswith(weather_inputs.GROUP)]
 
 
 def test_sliders_change_nothing_that_is_stored(opened):
@@ -607,7 +607,7 @@ CHANGES = {
     "as it was": lambda tree: None,
     "a value": changed_value,
     "a node less": lambda tree: tree.nodes.remove(tree.nodes[40]),
-    "a node more": lambda tree: tree.nodes.new("NodeFrame"),
+    "a node more": lambda tree: tree.weather_inputs.new("NodeFrame"),
     "a link less": lambda tree: tree.links.remove(tree.links[100]),
     "a muted node": lambda tree: setattr(tree.nodes[50], "mute", True),
 }
@@ -620,7 +620,7 @@ def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon):
         {"matter": matter_of("sand", 0.2, section), "soaking": soaking, **about}
         for section, soaking in ((0.005, (0.3, 0.9)), (0.008, (0.2, 0.8)))
     ]
-    groups = [nodes.new() for _ in kinds]
+    groups = [weather_inputs.new() for _ in kinds]
     for group, kind in zip(groups, kinds, strict=True):
         nodes.build(group, **kind)
     fresh = [(content_of(group), content_of(nodes.within(group))) for group in groups]
@@ -648,7 +648,7 @@ def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened
     bpy.ops.softground.clear_bake()
     assert contents(scene.softground.ground.data) == clear
     assert not scene.softground.ground.modifiers
-    assert not [group for group in bpy.data.node_groups if group.name.startswith(nodes.GROUP)]
+    assert not [group for group in bpy.data.node_groups if group.name.startswith(weather_inputs.GROUP)]
 
 
 @pytest.mark.parametrize("felt", [False, True])
@@ -670,7 +670,7 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
     with pytest.raises(RuntimeError, match=r"rename it"):
         bpy.ops.softground.add_weather()
     assert weather_modifier.modifier_of(carrier(scene)) is None
-    assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
+    assert not [group for group in bpy.data.node_groups if weather_inputs.is_weather(group)]
 
 
 def test_the_panel_says_that_weather_only_covers_prints_where_there_is_some(opened):

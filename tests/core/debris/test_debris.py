@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.debris import debris, flight
+from softground_addon.core.debris import debris, flight, step_throws
 from softground_addon.core.events import phases
 from softground_addon.core.events.events import as_edited, events
 from softground_addon.core.ground.presets import find
@@ -46,7 +46,7 @@ class Heard:
 
     def __init__(self, loads, left, height=flat, surface="sand"):
         if not left.throws:
-            left = replace(left, throws=debris.throws_of(loads, left.footprints, surface=surface))
+            left = replace(left, throws=step_throws.throws_of(loads, left.footprints, surface=surface))
         found = debris.sources(left.throws, left.steps, surface=surface, gravity=GRAVITY)
         self.pieces = debris.throw(found, surface=surface, gravity=GRAVITY, height=height)
         self.left = replace(left, thrown=debris.volumes(found))

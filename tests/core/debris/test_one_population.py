@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from softground_addon.core.debris import debris
+from softground_addon.core.debris import debris, step_throws
 from softground_addon.core.ground import crumbs
 from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.record.record import BakeRecord, dump, load
@@ -34,7 +34,7 @@ def baked(surface):
     """The record of a walk as a bake stores it: prints and how they throw."""
     loads = walk(steps=8)
     _, footprints = pressed(loads, MATERIALS[surface], 0.005)
-    throws = debris.throws_of([loads], footprints, surface=surface)
+    throws = step_throws.throws_of([loads], footprints, surface=surface)
     return load(dump(BakeRecord(footprints, {}, throws=throws)))
 
 
