@@ -12,7 +12,16 @@ from .command_line import cli
 from .ground import look
 from .importing import import_capture
 from .live import live
-from .operators import add_weather, bake_result, character_editing, modal_bake, prediction, sample_scene, show_prints
+from .operators import (
+    add_weather,
+    bake_result,
+    character_editing,
+    hard_ground,
+    modal_bake,
+    prediction,
+    sample_scene,
+    show_prints,
+)
 from .operators import shot_setup as operators
 from .output import event_points, export_formats, force_curves, make_sound
 from .panels import (
@@ -42,6 +51,7 @@ CLASSES = (
     *properties.CLASSES,
     *operators.CLASSES,
     *character_editing.CLASSES,
+    *hard_ground.CLASSES,
     *sample_scene.CLASSES,
     *modal_bake.CLASSES,
     *live.CLASSES,

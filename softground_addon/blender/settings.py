@@ -60,6 +60,12 @@ def exists(obj: bpy.types.Object | None) -> bool:
     return linked
 
 
+def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
+    """The hard objects of the settings that are there, each once."""
+    listed = dict.fromkeys(item.object for item in options.hard_grounds)
+    return [obj for obj in listed if exists(obj) and obj != options.ground]
+
+
 def forget_deleted_ground(scene: bpy.types.Scene) -> None:
     """Take a ground that was deleted out of the settings."""
     if scene.softground.ground is not None and not exists(scene.softground.ground):
@@ -178,6 +184,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         debris=options.debris,
         weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
+        hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from .ground.camera_view import CameraView
 from .ground.display_spacing import spacing_of
-from .ground.material import GroundMaterial, Pressure
+from .ground.material import UNSAID, GroundMaterial, Pressure
 from .loads.cell_limits import Fineness
 from .loads.estimate import ForceModel
 from .response.foot_holds import FootHold
@@ -193,6 +193,8 @@ class BakeSettings(SceneUnits):
         What steps find of earlier ones follows from it; None where they feel none.
     camera : CameraView or None
         The scene's, where a ground is to be made; None without one.
+    hard_grounds : tuple of ObjectName
+        Objects that soles stand on without a print.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -226,6 +228,7 @@ class BakeSettings(SceneUnits):
     shoe_treads: tuple[tuple[str, str, str], ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
+    hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
 
     @property
     def spacing_m(self) -> float:

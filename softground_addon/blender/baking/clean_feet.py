@@ -115,7 +115,7 @@ def _cleaned(
     rigged = [entry for entry in each if entry[0].centre is None]
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
-        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         touching = resting(motion, touching, shot.terrain)
         stands = yield from meanwhile(now, standing.slices(motion, touching, shot.terrain, asked.holds))
         response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds, stands))

@@ -31,6 +31,22 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
         )
 
 
+def hard_fault(obj: bpy.types.Object) -> str:
+    """What keeps soles from standing on an object as hard ground, and the remedy; empty where nothing does."""
+    name = obj.name
+    if obj.type != "MESH":
+        return (
+            f"'{name}' in Hard Ground is not a mesh: convert it (Object > Convert > Mesh), or remove it from the list."
+        )
+    if obj.mode == "EDIT":
+        return f"'{name}' in Hard Ground is in Edit Mode: leave it with Tab first."
+    if mover := still_ground.mover_of(obj):
+        return f"'{name}' in Hard Ground moves, as '{mover.name}' is animated: remove it from the list, or its keys."
+    if by := still_ground.changes_shape(obj):
+        return f"'{name}' in Hard Ground changes its shape by {by}: remove it from the list, or apply that."
+    return ""
+
+
 def check_usable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
     detail = trail_detail.detail_of(ground)

@@ -38,6 +38,10 @@ def draw(layout: Any, scene: bpy.types.Scene, warnings: Sequence[str], changed: 
         if "Set Mass" in text:
             layout.prop(character, "mass")
     text = "\n".join(warnings)
+    listed = {item.object.name for item in options.hard_grounds if item.object}
+    for name in dict.fromkeys(re.findall(r"Press Add '([^']+)'", text)):
+        if name not in listed:
+            layout.operator("softground.add_hard_ground", text=f"Add '{name}'", translate=False).object = name
     for words, operator in _OPERATORS.items():
         if re.search(words, text):
             button = layout.operator(operator)

@@ -13,7 +13,7 @@ from ..debris import debris_object
 from ..ground import painted_ground
 from ..operators import prediction
 from ..operators.character_editing import active_character
-from ..operators.panel_base import AdvancedPanel, SidebarPanel
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
 
 
 class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
@@ -112,6 +112,28 @@ class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
+class SOFTGROUND_UL_hard_grounds(Listed):
+    """Hard objects by name."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        layout.prop(item, "object", text="", emboss=False, icon="MESH_CUBE")
+
+
+class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
+    """Crates, stairs, floors and rocks that feet stand on without a print"""
+
+    bl_label = "Hard Ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row, options = self.fields().row(), settings.options_of(context)
+        row.template_list(
+            "SOFTGROUND_UL_hard_grounds", "", options, "hard_grounds", options, "active_hard_ground", rows=2, maxrows=5
+        )
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_hard_ground", text="", icon="ADD")
+        buttons.operator("softground.remove_hard_ground", text="", icon="REMOVE")
+
+
 class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
     """How fine the ground is, and what it looks like"""
 
@@ -167,5 +189,7 @@ CLASSES = (
     SOFTGROUND_PT_material,
     SOFTGROUND_PT_layers,
     SOFTGROUND_PT_painted,
+    SOFTGROUND_UL_hard_grounds,
+    SOFTGROUND_PT_hard_ground,
     SOFTGROUND_PT_mesh,
 )

@@ -13,7 +13,7 @@ from .character import (
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
-from .scene import DEFAULT_CELL_SIZE, SoftGroundSettings
+from .scene import DEFAULT_CELL_SIZE, SoftGroundHardGround, SoftGroundSettings
 
 CLASSES = (
     SoftGroundJoint,
@@ -25,6 +25,7 @@ CLASSES = (
     SoftGroundPainted,
     SoftGroundTilt,
     SoftGroundGrounding,
+    SoftGroundHardGround,
     SoftGroundSettings,
     SoftGroundPreferences,
 )

@@ -53,12 +53,25 @@ def _worked_out(name: str) -> dict[str, Any]:
     return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
 
 
+class SoftGroundHardGround(bpy.types.PropertyGroup):
+    """An object that soles stand on without a print."""
+
+    object: PointerProperty(
+        name="Object",
+        description="Mesh that stands still and bears feet without giving way: a crate, stairs, a floor, a rock",
+        type=bpy.types.Object,
+        poll=is_mesh,
+    )
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
     ground: PointerProperty(
         name="Ground", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=is_mesh
     )
+    hard_grounds: CollectionProperty(name="Hard Ground", type=SoftGroundHardGround)
+    active_hard_ground: IntProperty(name="Active Hard Ground", options={"HIDDEN"})
     characters: CollectionProperty(name="Characters", type=SoftGroundCharacter)
     active_character: IntProperty(name="Active Character", options={"HIDDEN"})
     material: PointerProperty(name="Material", type=SoftGroundMaterial)

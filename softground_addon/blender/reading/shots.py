@@ -13,6 +13,7 @@ from ...core.composers.relief_plan import IMAGE
 from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
 from ...core.findings import Finding
+from ...core.ground.hard_ground import soft_ground
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
@@ -35,6 +36,7 @@ from ..sampling.control_poses import RigPoses
 from ..sampling.prop_extraction import check_props
 from ..sampling.rig_sampling import check_rig, sample_character, sample_prop
 from ..weather import ground_weather as weather
+from . import hard_ground
 
 Array = NDArray[np.float64]
 
@@ -54,7 +56,7 @@ class Shot:
     surface : GroundSurface or None
         The scene's ground, if it has one.
     terrain : Terrain
-        The undisturbed ground.
+        The undisturbed ground, with the hard objects on it.
     rigs : tuple of ReadRig
         Of the characters that have one, where they are to respond.
     findings : tuple of Finding
@@ -73,8 +75,8 @@ class Shot:
     @property
     def variation(self) -> PaintedSurface | None:
         """How the ground varies from place to place, where it is painted."""
-        painted = self.surface is not None and self.surface.factors is not None
-        return PaintedSurface(self.terrain) if painted and isinstance(self.terrain, MeshTerrain) else None
+        painted, ground = self.surface is not None and self.surface.factors is not None, soft_ground(self.terrain)
+        return PaintedSurface(ground) if painted and isinstance(ground, MeshTerrain) else None
 
 
 def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
@@ -112,6 +114,9 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
     if ground is not None:
         ground_checks.check_usable(ground)
+    for name in wanted.hard_grounds:
+        if fault := ground_checks.hard_fault(settings.found(name)):
+            raise InputError(fault)
     return wanted
 
 
@@ -128,7 +133,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain, rigs, tuple(findings))
+        terrain, missing = yield from _with_hard(scene, wanted, motions, plan.terrain, np.stack([lower, upper]))
+        return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing))
     yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
@@ -137,9 +143,17 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
-    work = ground_mesh.terrain_of.slices(surface, np.stack([places.min(axis=0), places.max(axis=0)]))
-    terrain = yield from meanwhile(Progress("sample", 1.0), work)
-    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, tuple(findings))
+    bounds = np.stack([places.min(axis=0), places.max(axis=0)])
+    soft = yield from meanwhile(Progress("sample", 1.0), ground_mesh.terrain_of.slices(surface, bounds))
+    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds)
+    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
+
+
+def _with_hard(
+    scene: bpy.types.Scene, wanted: BakeSettings, motions: list[CharacterMotion], ground: Terrain, bounds: Array
+) -> Job[tuple[Terrain, list[Finding]]]:
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds)
+    return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:

@@ -27,9 +27,10 @@ from . import input_hashes
 
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
 ANIMATION, PLACE, MOVEMENT, BODY, SOLE = "animation", "place", "movement", "body", "sole"
+HARD = "hard"
 VERSION = "version"
-_OF_MOVERS = (ANIMATION, PLACE, MOVEMENT, BODY)
-_OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE)
+_OF_MOVERS = (ANIMATION, PLACE, MOVEMENT, BODY, HARD)
+_OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE, HARD)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _UNKNOWN = "The bake has no record of its settings"
@@ -109,6 +110,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         MOVEMENT: "The rig of '{}', or what it follows, has changed",
         BODY: "The mesh of '{}' that prints has changed",
         SOLE: "The mesh of '{}', whose sole presses steps, has changed",
+        HARD: "The mesh or the position of '{}', which is hard ground, has changed",
     }
     return tuple(
         dict.fromkeys(texts.get(kind) or of_objects.get(kind, _UNKNOWN).format(name) for kind, name in changed)
@@ -144,7 +146,8 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
 
 
 def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
-    """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
+    """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and the
+    hard objects that bear them."""
     ground = settings.found(wanted.ground) if wanted.ground else None
     movers = [obj for character in wanted.characters for obj in movers_of(character)]
     return {
@@ -152,7 +155,13 @@ def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{character.name}": _of_body(scene, character) for character in wanted.characters},
+        **{f"{HARD}:{name.name}": _of_hard(settings.found(name)) for name in wanted.hard_grounds},
     }
+
+
+def _of_hard(obj: bpy.types.Object) -> str:
+    modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
+    return input_hashes.joined([_of_ground(obj), *modifiers])
 
 
 def of_soles(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, str]:
@@ -184,7 +193,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | {"soles": [{**sole, "object": bool(sole["object"])} for sole in character["soles"]]}
         for character in inputs["characters"]
     ]
-    compared = {**inputs, "ground": "", "characters": nameless}
+    compared = {**inputs, "ground": "", "characters": nameless, "hard_grounds": len(inputs.get("hard_grounds", ()))}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
 

@@ -13,6 +13,7 @@ from ..findings import Finding
 from ..ground.heightfield import Terrain
 from ..legs.grounding import Response, responding
 from ..loads.estimate import CharacterLoads
+from ..loads.raised_rests import stands_on_hard
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
@@ -62,7 +63,7 @@ def standing_on(
         return tuple(motions)
     standing = []
     for motion in motions:
-        as_it_is = motion.centre is not None
+        as_it_is = motion.centre is not None or stands_on_hard(motion, terrain)
         yield
         standing.append(motion if as_it_is else (yield from stood_on.slices(motion, terrain)))
     return tuple(standing)
@@ -92,7 +93,7 @@ def leaning(
                 moved.append(motion)
                 leans.append(np.zeros((len(motion.frames), 2)))
                 continue
-            touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+            touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
             yield
             response = yield from respond.slices(
                 motion, touching, terrain, footprints, tilt=options.tilt, grounding=None
@@ -123,7 +124,7 @@ def responses_of(
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
-        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         pressed = touching, terrain, left.edited
         followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
         yield
@@ -158,7 +159,7 @@ def gap_table(
         }
     table = {}
     for of_character, motion in zip(loads, motions, strict=True):
-        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         yield
         left = yield from gaps.slices(motion, touching, terrain, footprints)
         table[motion.name] = _statistics(left)

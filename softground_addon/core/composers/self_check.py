@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ..errors import BakeError
 from ..findings import Finding
+from ..ground.hard_ground import bare, up_to
 from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
+from ..loads.contacts import LEAVE_HEIGHT
 from ..loads.estimate import CharacterLoads
 from ..loads.missed_steps import advice, missed_steps
 from ..loads.missing_ground import beyond_edge
@@ -123,10 +125,11 @@ def no_motion(motion: CharacterMotion) -> Finding | None:
 
 def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
     """Return whether it moves, prints and gets along."""
-    motion = character.motion
+    motion, hard = character.motion, character.contacts.hard
+    hard = np.zeros(1, dtype=bool) if hard is None else hard
     if still := no_motion(motion):
         yield still
-    elif not steps:
+    elif not steps and not np.any(hard):
         yield Finding(
             "no_print",
             "error",
@@ -135,7 +138,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "that they face down.",
         )
     else:
-        load = character.forces.forces[..., 2].max(axis=0) / (motion.mass * motion.gravity)
+        pressing = np.where(hard, 0.0, character.forces.forces[..., 2])
+        load = pressing.max(axis=0) / (motion.mass * motion.gravity)
         bearing = {sole.sole.name for sole, most in zip(motion.soles, load, strict=True) if most > BEARS}
         mute = sorted(bearing - {step.sole for step in steps})
         if mute:
@@ -215,11 +219,14 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
     motion = character.motion
     if motion.centre is not None or motion.four_legged:
         return
-    belt = treadmill_speed(motion, character.contacts)
+    belt, hard = treadmill_speed(motion, character.contacts), character.contacts.hard
     slower, swings = [], []
-    for sole in motion.soles:
+    for number, sole in enumerate(motion.soles):
         of_sole = [step for step in steps if step.sole == sole.sole.name]
+        on_hard = motion.frames[:0] if hard is None else motion.frames[hard[:, number]]
         for step, after in itertools.pairwise(of_sole):
+            if ((on_hard > step.end_frame) & (on_hard < after.start_frame)).any():
+                continue  # it has stepped between them
             seconds = (after.start_frame - step.start_frame) / motion.frame_rate
             stride = float(np.linalg.norm((after.position - step.position)[:2])) + belt * seconds
             if stride > LEAST_STRIDE * motion.leg_length:
@@ -303,13 +310,13 @@ def _skin(
 ) -> Slices[list[Finding]]:
     """Return whether ground, steps and resting skin agree."""
     motion = character.motion
-    beyond = beyond_edge(motion, terrain)
+    beyond, soft = beyond_edge(motion, terrain), bare(terrain)
     height, has_ground = np.empty(skin.rise.shape), np.empty(skin.rise.shape, dtype=bool)
     for start in range(0, len(height), SOME_FRAMES):
         now = slice(start, start + SOME_FRAMES)
         x, y, z = np.moveaxis(skin.position[now], -1, 0)
-        height[now] = z - beyond.heights(x, y)
-        has_ground[now] = np.isfinite(terrain.heights(x, y))
+        height[now] = z - up_to(beyond, z + LEAVE_HEIGHT * motion.leg_length).heights(x, y)
+        has_ground[now] = np.isfinite(soft.heights(x, y))
         yield
     height[~np.isfinite(height)] = np.inf
     over = _resting(height, skin)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..ground.hard_ground import soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.terrain import MeshTerrain
 from ..loads.estimate import CharacterLoads, estimate_loads
@@ -60,8 +61,9 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: s
             for number, sole in enumerate(character.motion.soles)
         ]
     )
+    terrain = soft_ground(terrain)
     name = f"'{ground}'" if ground else "the ground"
-    if not len(place):
+    if not any(character.contacts.standing.any() for character in loads):
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         raise InputError(
             f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -116,15 +117,27 @@ class MeshTerrain:
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
         return MeshTerrain(corners, *bins, of_corners)
 
-    def heights(self, x: Array, y: Array) -> Array:
-        """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
+    def heights(self, x: Array, y: Array, limit: Array | None = None) -> Array:
+        """Height of the highest upward-facing surface at each place [m], or of those up to a limit; NaN without any."""
         across, along = np.ravel(x), np.ravel(y)
         highest = np.full(np.size(x), -np.inf)
         for first in range(0, len(highest), PLACES_AT_ONCE):
             part = slice(first, first + PLACES_AT_ONCE)
             hits = self._surfaces(across[part], along[part])
-            np.maximum.at(highest[part], hits.point, hits.z)
+            point, z = hits.point, hits.z
+            if limit is not None:
+                below = z <= np.ravel(limit)[part][point]
+                point, z = point[below], z[below]
+            np.maximum.at(highest[part], point, z)
         return np.where(np.isinf(highest), np.nan, highest).reshape(np.shape(x))
+
+    @staticmethod
+    @sliced
+    def joined(terrains: Sequence[MeshTerrain]) -> Slices[MeshTerrain]:
+        """One of the triangles of several, without their values."""
+        corners = np.concatenate([terrain.corners for terrain in terrains])
+        bins = yield from _bins(corners[..., :2])
+        return MeshTerrain(corners, *bins, np.zeros((len(corners), 3, 0)))
 
     def interpolated(self, x: Array, y: Array) -> Array:
         """The values of the highest upward-facing surface at each place, (C, ...); NaN where there is none."""

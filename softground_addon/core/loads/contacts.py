@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
@@ -91,6 +92,8 @@ class Contacts:
         Distance of each sole from its ground after `offset` is removed [m], infinite where nothing can bear it.
     aloft : (N, S) bool array, optional
         Where the skin shows a sole in the air, if it tells.
+    hard : (N, S) bool array, optional
+        Where a sole stands on something hard, which takes no print: these do not count as touching.
     """
 
     touching: Mask
@@ -98,11 +101,17 @@ class Contacts:
     normal: Array
     clearance: Array
     aloft: Mask | None = None
+    hard: Mask | None = None
+
+    @property
+    def standing(self) -> Mask:
+        """Which soles touch the ground or something hard, (N, S)."""
+        return self.touching if self.hard is None else self.touching | self.hard
 
     def during(self, steps: slice) -> Contacts:
         """The contacts at some of the steps."""
-        aloft = None if self.aloft is None else self.aloft[steps]
-        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps], aloft)
+        aloft, hard = (None if mask is None else mask[steps] for mask in (self.aloft, self.hard))
+        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps], aloft, hard)
 
 
 @sliced
@@ -248,7 +257,8 @@ def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Trac
     points = sole.landmark_positions()
 
     def during(steps: slice) -> Array:
-        clearance, normals = clearances(points[steps], terrain, reach=SLOPE_PROBE * motion.leg_length)
+        under = up_to(terrain, points[steps, :, 2] + LEAVE_HEIGHT * motion.leg_length)
+        clearance, normals = clearances(points[steps], under, reach=SLOPE_PROBE * motion.leg_length)
         lowest = clearance.argmin(axis=1)[:, None]
         return np.concatenate([clearance, np.take_along_axis(normals, lowest[..., None], axis=1)[:, 0]], axis=1)
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from ..dynamics.body_dynamics import body_dynamics
 from ..dynamics.continuation import continued, without_holds
+from ..ground.hard_ground import HardOnSoft
 from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
 from ..motion.motion import CharacterMotion, steps_per_frame
@@ -83,7 +84,7 @@ def estimate_loads(
             contacts = refine_contacts(source, contacts, body)
         yield
         forces = whole_body_forces(source, contacts, body)
-    if ground is not terrain:
+    if ground is not terrain or isinstance(terrain, HardOnSoft):
         contacts, forces = without_missing(source, terrain, contacts, forces)
     shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))

@@ -41,6 +41,7 @@ def joined(
         normal=np.broadcast_to(UP, (count, soles, 3)).copy(),
         clearance=np.full((count, soles), np.inf),
         aloft=np.ones((count, soles), dtype=bool) if all(part[1].aloft is not None for part in parts) else None,
+        hard=np.zeros((count, soles), dtype=bool) if any(part[1].hard is not None for part in parts) else None,
     )
     vectors = (np.zeros((count, soles, 3)), np.zeros((count, 3)), np.zeros((count, soles, 3)))
     forces = ContactForces(*vectors, np.zeros((count, soles)), np.zeros((count, soles)))

@@ -59,13 +59,13 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
     if motion.centre is not None:
         return []  # a prop may lie anywhere
     shortest = REST_TIME * motion.pendulum_time / motion.time_step
-    carried, belt = contacts.touching.any(axis=1), treadmill_velocity(motion, contacts)
+    carried, belt = contacts.standing.any(axis=1), treadmill_velocity(motion, contacts)
     missed = []
     for number, sole in enumerate(motion.soles):
         clearance = contacts.clearance[:, number]
-        for first, last in zip(*runs(_rests(sole, motion, belt)), strict=True):
+        for first, last in zip(*runs(rests(sole, motion, belt)), strict=True):
             during = slice(first, last)
-            if last - first < shortest or contacts.touching[during, number].any():
+            if last - first < shortest or contacts.standing[during, number].any():
                 continue
             if not carried[during].any() or np.isinf(clearance[during]).all():
                 height = float(np.median(clearance[during]))
@@ -73,7 +73,7 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
     return sorted(missed, key=lambda step: step.frame)
 
 
-def _rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) -> Mask:
+def rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) -> Mask:
     """When some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
     points = sole.landmark_positions()
     if len(points) < 2:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.hard_ground import HardOnSoft, bare
 from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
-from .contacts import Contacts
+from ..numerics.intervals import runs
+from .contacts import TOUCH_HEIGHT, Contacts
 from .forces import ContactForces
 
 Array = NDArray[np.float64]
@@ -81,16 +84,20 @@ def beyond_edge(motion: CharacterMotion, terrain: Terrain) -> Terrain:
 def without_missing(
     motion: CharacterMotion, terrain: Terrain, contacts: Contacts, forces: ContactForces
 ) -> tuple[Contacts, ContactForces]:
-    """Contacts and forces on the ground that is there, of those found `beyond_edge`."""
-    missing = contacts.touching.copy()
+    """Contacts and forces on the ground that is there, of those found `beyond_edge`; those on hard objects bear."""
+    hard = _on_hard(motion, terrain, contacts) if isinstance(terrain, HardOnSoft) else None
+    missing, soft = contacts.touching.copy(), bare(terrain)
     for index, sole in enumerate(motion.soles):
         steps = np.flatnonzero(contacts.touching[:, index])
-        missing[steps, index] = ~_has_ground(sole, steps, terrain)
+        missing[steps, index] = ~_has_ground(sole, steps, soft.heights)
+    touching = contacts.touching & ~missing
+    if hard is not None:
+        touching, missing = touching & ~hard, missing & ~hard
     clearance = np.where(missing, np.inf, contacts.clearance)
     on_ground = ~missing
     pressing = forces.forces * on_ground[..., None]
     return (
-        replace(contacts, touching=contacts.touching & on_ground, clearance=clearance),
+        replace(contacts, touching=touching, clearance=clearance, hard=hard),
         replace(
             forces,
             forces=pressing,
@@ -101,19 +108,36 @@ def without_missing(
     )
 
 
-def _has_ground(sole: SoleMotion, steps: NDArray[np.intp], terrain: Terrain) -> Mask:
-    """True where some of a sole is over ground, (N,)."""
+def _on_hard(motion: CharacterMotion, terrain: HardOnSoft, contacts: Contacts) -> Mask:
+    """The contacts (N, S) on hard objects: mostly over them, with nothing at the level of the soft ground beside."""
+    on_hard, soft = np.zeros_like(contacts.touching), bare(terrain)
+    for index, sole in enumerate(motion.soles):
+        steps = np.flatnonzero(contacts.touching[:, index])
+        level = float(contacts.offset[index]) + TOUCH_HEIGHT * motion.leg_length
+        on_hard[steps, index] = _has_ground(sole, steps, terrain.hard_heights)
+        on_hard[steps, index] &= ~_has_ground(sole, steps, soft.heights, level)
+        for first, last in zip(*runs(contacts.touching[:, index]), strict=True):
+            on_hard[first:last, index] = on_hard[first:last, index].mean() > 0.5
+    return on_hard
+
+
+def _has_ground(
+    sole: SoleMotion, steps: NDArray[np.intp], heights: Callable[[Array, Array], Array], level: float = np.inf
+) -> Mask:
+    """True where some of a sole is over ground, and at most at a level above it [m], (N,)."""
 
     def highest(part: slice) -> Array:
-        x, y = np.moveaxis(_spots(sole, steps[part]), -1, 0)
-        return np.asarray(np.fmax.reduce(terrain.heights(x, y), axis=1))
+        x, y, *z = np.moveaxis(_spots(sole, steps[part], axes=2 if level == np.inf else 3), -1, 0)
+        height = heights(x, y)
+        near = np.where(z[0] - height <= level, height, np.nan) if z else height
+        return np.asarray(np.fmax.reduce(near, axis=1))
 
     return np.isfinite(in_stretches(highest, len(steps)))
 
 
-def _spots(sole: SoleMotion, steps: NDArray[np.intp]) -> Array:
-    """Places all over a sole, (N, K, 2) [m]."""
-    spots = [sole.landmark_positions()[steps, :, :2]]
+def _spots(sole: SoleMotion, steps: NDArray[np.intp], axes: int = 2) -> Array:
+    """Places all over a sole, by x, y and perhaps z, (N, K, axes) [m]."""
+    spots = [sole.landmark_positions()[steps, :, :axes]]
     for number, patch in enumerate(sole.sole.patches):
         rows, columns = (np.linspace(0, size - 1, NODES).astype(int) for size in patch.heights.shape)
         row, column = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))
@@ -121,5 +145,5 @@ def _spots(sole: SoleMotion, steps: NDArray[np.intp]) -> Array:
         row, column = row[under], column[under]
         flat = [patch.origin[0] + column * patch.spacing, patch.origin[1] + row * patch.spacing]
         nodes = np.stack([*flat, patch.heights[row, column], np.ones(len(row))])
-        spots.append(np.swapaxes(sole.transforms[steps, number, :2] @ nodes, 1, 2))
+        spots.append(np.swapaxes(sole.transforms[steps, number, :axes] @ nodes, 1, 2))
     return np.concatenate(spots, axis=1)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.hard_ground import bare
 from ..ground.heightfield import Surface, Terrain, TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
@@ -48,7 +49,7 @@ class UndisturbedCells:
 
     def __init__(self, terrain: Terrain, variation: Variation | None, cell_size: float) -> None:
         self.cell_size = cell_size
-        self._terrain = terrain
+        self._terrain = bare(terrain)
         self._tiles: dict[int, TerrainTiles] = {}
         self._variation = VariationTiles(variation, cell_size) if variation else None
 

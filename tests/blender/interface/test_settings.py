@@ -28,6 +28,7 @@ NO_INPUT = {
     "grounding.by_button": "what Clear Bake switches off again",
     "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
+    "active_hard_ground": "which one the list shows",
     "characters.active_hold": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.root_motion_strength": "how much of a layer shows, which counts as the rig's movement",
@@ -48,6 +49,8 @@ def all_on(scene):
     bpy.ops.softground.add_character()
     options = scene.softground
     options.ground, options.frame_end = plane(scene), 40
+    options.hard_grounds.add().object = plane(scene, size=0.5, vertices=2)
+    options.hard_grounds[0].object.location.x = 20.0
     options.tread_pattern, options.tread_image = "IMAGE", bpy.data.images.new("Sole", 4, 8)
     options.tilt.use = options.grounding.use = True
     options.characters[0].holds.add().foot = "foot.L"
@@ -121,6 +124,7 @@ def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot)
         "tilt.name",
         "grounding.name",
         "characters.holds.name",
+        "hard_grounds.name",
     }  # groups that have no list
     assert seen - changing - unused == set(NO_INPUT)
 

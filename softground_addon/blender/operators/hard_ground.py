@@ -1,0 +1,66 @@
+"""Operators on the list of hard objects that soles stand on."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ...core.errors import InputError
+from .. import settings
+from ..ground import ground_checks
+from ..operator_base import reports_errors
+
+
+class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
+    """Let soles stand on the selected meshes, which take no prints: crates, stairs, floors, rocks"""
+
+    bl_idname = "softground.add_hard_ground"
+    bl_label = "Add Hard Ground"
+    bl_options = {"REGISTER", "UNDO"}
+
+    object: StringProperty(
+        name="Object",
+        description="Name of the mesh; those that are selected if empty",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        options = settings.options_of(context)
+        chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
+        if self.object:
+            chosen = [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
+        chosen = [obj for obj in chosen if obj != options.ground and obj not in settings.hard_grounds_of(options)]
+        if not chosen:
+            raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")
+        for obj in chosen:
+            if fault := ground_checks.hard_fault(obj):
+                raise InputError(fault)
+        for obj in chosen:
+            options.hard_grounds.add().object = obj
+        options.active_hard_ground = len(options.hard_grounds) - 1
+        self.report({"INFO"}, f"Soles stand on {', '.join(repr(obj.name) for obj in chosen)}")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_remove_hard_ground(bpy.types.Operator):
+    """Take the object out of the list; it stays in the scene as it is"""
+
+    bl_idname = "softground.remove_hard_ground"
+    bl_label = "Remove Hard Ground"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether an object is chosen in the list."""
+        options = settings.options_of(context)
+        return 0 <= options.active_hard_ground < len(options.hard_grounds)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        options = settings.options_of(context)
+        options.hard_grounds.remove(options.active_hard_ground)
+        options.active_hard_ground = max(0, min(options.active_hard_ground, len(options.hard_grounds) - 1))
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_add_hard_ground, SOFTGROUND_OT_remove_hard_ground)

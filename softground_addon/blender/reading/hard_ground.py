@@ -1,0 +1,104 @@
+"""Hard objects that soles stand on: those of the settings, and those that a shot shows under its feet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.findings import Finding, listed
+from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.heightfield import Terrain
+from ...core.ground.terrain import MeshTerrain
+from ...core.loads.raised_rests import RaisedRest, carried_by, raised_rests, reach_of
+from ...core.motion.motion import CharacterMotion
+from ...core.numerics.slices import Slices, sliced
+from ...core.settings import BakeSettings, ObjectName
+from .. import settings
+from ..ground import ground_checks, ground_mesh
+from ..ground.baked_ground import display_mesh_of
+from . import staleness
+
+Array = NDArray[np.float64]
+
+
+@sliced
+def with_hard_objects(
+    scene: bpy.types.Scene,
+    wanted: BakeSettings,
+    motions: Sequence[CharacterMotion],
+    ground: Terrain,
+    bounds: Array,
+) -> Slices[tuple[Terrain, list[Finding]]]:
+    """A soft ground with the hard objects that soles stand on, and which of these are not in the settings.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    wanted : BakeSettings
+    motions : sequence of CharacterMotion
+    ground : Terrain
+    bounds : (2, 2) float array
+        Lower and upper corner of what is looked at [m].
+    """
+    unit_scale, reach = wanted.unit_scale_m, reach_of(motions)
+    hard = [top for _, top in (yield from _tops(wanted.hard_grounds, unit_scale, bounds))]
+    terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach) if hard else ground
+    raised = [rest for motion in motions for rest in raised_rests(motion, terrain)]
+    yield
+    shown = yield from _tops(_still_meshes(scene, wanted, raised) if raised else (), unit_scale, bounds)
+    carried = [(name, top, rests) for name, top in shown if (rests := carried_by(top.heights, raised, terrain))]
+    if carried:
+        hard += [top for _, top, _ in carried]
+        terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach)
+    return terrain, [_finding(name.name, rests) for name, _, rests in carried]
+
+
+def _tops(
+    names: Iterable[ObjectName], unit_scale: float, bounds: Array
+) -> Slices[list[tuple[ObjectName, MeshTerrain]]]:
+    """The upper sides of objects within bounds in the plane, of those that have any."""
+    tops = []
+    for name in names:
+        surface = ground_mesh.undisturbed_surface(settings.found(name), unit_scale)
+        yield
+        with suppress(InputError):  # nobody walks there
+            tops.append((name, (yield from ground_mesh.terrain_of.slices(surface, bounds))))
+    return tops
+
+
+def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence[RaisedRest]) -> list[ObjectName]:
+    """The meshes that a scene shows where soles rest, and that do not move."""
+    places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
+    margin = max(rest.near for rest in raised) / wanted.unit_scale_m
+    ground = settings.found(wanted.ground) if wanted.ground else None
+    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene, wanted))
+    known |= {ground, display_mesh_of(ground)} if ground else set()
+    found = []
+    for obj in scene.objects:
+        if obj.type != "MESH" or obj in known or obj.hide_render or obj.display_type in ("WIRE", "BOUNDS"):
+            continue
+        if not obj.visible_get(view_layer=scene.view_layers[0]):
+            continue
+        world = np.array(obj.matrix_world)
+        box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
+        inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
+        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj):
+            found.append(settings.name_of(obj))
+    return found
+
+
+def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:
+    """What to say of an object that carries soles and is not in the settings."""
+    who, first = listed(dict.fromkeys(rest.character for rest in rests)), min(rest.frame for rest in rests)
+    count = f"{len(rests)} steps of {who} stand" if len(rests) > 1 else f"1 step of {who} stands"
+    return Finding(
+        "hard_ground",
+        "warning",
+        f"{count} on '{name}', from frame {first:.0f} on, without a print, but '{name}' is not in Hard Ground.",
+        f"Press Add '{name}', so that the bake notices when it is moved, or hide it if nothing stands on it.",
+    )

@@ -1,0 +1,131 @@
+"""Hard objects on a soft ground: soles stand on the highest surface within their reach, and print in what is soft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics import cell_keys
+from .heightfield import Terrain
+from .terrain import SAME_LAYER, MeshTerrain
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Heights up to which soles can stand, by square of the plane: nobody below a bridge stands on its deck.
+
+    Attributes
+    ----------
+    side : float
+        Of a square [m].
+    keys : (K,) int array
+        Squares on or beside the way of a sole, ascending (`numerics.cell_keys`).
+    heights : (K,) float array
+        World heights [m].
+    """
+
+    side: float
+    keys: cell_keys.Keys
+    heights: Array
+
+    @staticmethod
+    def of(points: Array, side: float) -> Reach:
+        """The reach of soles that could stand at these world positions (N, 3) [m], and anywhere below them.
+
+        Examples
+        --------
+        >>> reach = Reach.of(np.array([[0.5, 0.5, 0.2], [0.5, 0.6, 0.3]]), 1.0)
+        >>> reach.at(np.array([0.1, 1.9, 2.1]), np.zeros(3))
+        array([ 0.3,  0.3, -inf])
+        """
+        keys, heights = _highest(cell_keys.keys_at(points[:, :2], side), points[:, 2])
+        beside = (keys[:, None] + cell_keys.AROUND).ravel()
+        return Reach(side, *_highest(beside, np.repeat(heights, len(cell_keys.AROUND))))
+
+    def at(self, x: Array, y: Array) -> Array:
+        """World heights at places of any shape (...,) [m], -inf far from the way of all soles."""
+        wanted = cell_keys.keys_at(np.stack([x, y], axis=-1), self.side)
+        nearest = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+        return np.where(self.keys[nearest] == wanted, self.heights[nearest], -np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lower:
+    """A reach that ends at a limit for each place, if that is lower."""
+
+    reach: Reach | _Lower
+    limit: Array
+
+    def at(self, x: Array, y: Array) -> Array:
+        """As `Reach.at`, for as many places as there are limits."""
+        return np.minimum(self.reach.at(x, y), self.limit)
+
+
+def _highest(keys: cell_keys.Keys, heights: Array) -> tuple[cell_keys.Keys, Array]:
+    """Each key once, ascending, with the largest of its heights."""
+    once, number = np.unique(keys, return_inverse=True)
+    highest = np.full(len(once), -np.inf)
+    np.maximum.at(highest, number, heights)
+    return once, highest
+
+
+@dataclass(frozen=True, eq=False)
+class HardOnSoft:
+    """A terrain of a soft ground and the hard objects that stand on it.
+
+    Attributes
+    ----------
+    ground : Terrain
+        The soft ground, whole.
+    hard : MeshTerrain
+        Upper sides of the hard objects.
+    reach : Reach
+        Up to where soles can stand on them.
+    """
+
+    ground: Terrain
+    hard: MeshTerrain
+    reach: Reach | _Lower
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights of the highest surface within reach at world positions [m], NaN where there is none."""
+        return np.asarray(np.fmax(self.ground.heights(x, y), self.hard_heights(x, y)))
+
+    def hard_heights(self, x: Array, y: Array) -> Array:
+        """Heights of the highest hard surface within reach at world positions [m], NaN where there is none."""
+        across, along = np.broadcast_arrays(x, y)
+        return self.hard.heights(across, along, self.reach.at(across, along))
+
+
+class _Bare:
+    """What of the soft ground no hard object covers."""
+
+    def __init__(self, terrain: HardOnSoft) -> None:
+        self.terrain = terrain
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m], NaN where there is no ground or something hard on it."""
+        height, hard = self.terrain.ground.heights(x, y), self.terrain.hard_heights(x, y)
+        return np.where(hard > height - SAME_LAYER, np.nan, height)
+
+
+def up_to(terrain: Terrain, limit: Array) -> Terrain:
+    """A terrain for arrays of places, without hard surfaces above a limit at each, of their shape [m].
+
+    What a sole is beside, or within by mistake, does not bear it.
+    """
+    return replace(terrain, reach=_Lower(terrain.reach, limit)) if isinstance(terrain, HardOnSoft) else terrain
+
+
+def bare(terrain: Terrain) -> Terrain:
+    """The part of a terrain that takes prints: without what hard objects cover, or all of it."""
+    return _Bare(terrain) if isinstance(terrain, HardOnSoft) else terrain
+
+
+def soft_ground(terrain: Terrain) -> Terrain:
+    """The soft ground of a terrain, whole."""
+    return terrain.ground if isinstance(terrain, HardOnSoft) else terrain
