@@ -18,6 +18,7 @@ from ..loads.missed_steps import advice, missed_steps
 from ..loads.missing_ground import beyond_edge
 from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion, LowSkin
+from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
 from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
@@ -46,10 +47,8 @@ STANDING_PERCENTILE = 20.0
 SOME_FRAMES = 200
 """Frames whose skin is looked up on the ground in one go."""
 
-PERSON_MASS, PERSON_LEG = 77.5, 0.87
-"""A person of 1.78 m [kg], hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
-MASS_RANGE = 4.0
-"""Ratio of mass to that of the body's skin, or of a person of the same leg length, beyond which it is asked about."""
+PERSON_LEG = 0.87
+"""A person of 1.78 m, hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
 APART = 0.02
 """Difference of the offsets of one character's feet that is no error of a pose, up to an adult's size [m]; of a larger
 one, it grows with the legs."""
@@ -171,16 +170,18 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
         )
     if motion.centre is not None:
         return  # a prop has no legs to go by
-    if unit := wrong_unit(motion.stature):
+    captured = motion.two_legs and all(sole.sole.underside is None for sole in motion.soles)
+    if unit := wrong_unit(motion.stature, captured=captured):
         size = f"{motion.stature:.0f} m" if motion.stature > 1 else f"{motion.stature * 100:.2g} cm"
         yield Finding(
             "unit_scale",
-            "error",
+            "error" if wrong_unit(motion.stature) else "warning",
             f"'{motion.name}' is {size} tall: its file is in {unit}.",
-            f"Press Scale by {scale_to_metres(motion.stature):g}, or leave it if the size is intended.",
+            f"Press Scale by {scale_to_metres(motion.stature, captured=captured):g}, or leave it if the size is "
+            "intended.",
         )
         return  # with its size, the mass that suits it changes
-    likely, by = motion.skin.mass if motion.skin else 0.0, "the volume of its skin"
+    likely, by = likely_mass(motion.skin.mass if motion.skin else 0.0, motion.size, two_legs=motion.two_legs)
     if not likely:
         likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "the length of its legs"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
