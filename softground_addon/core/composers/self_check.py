@@ -105,6 +105,8 @@ def self_check(
         findings += yield from _edge(motion, steps, terrain, ground)
         if motion.skin is not None:
             findings += yield from _skin(character, motion.skin, steps, terrain, ground)
+        elif motion.stature > 0:
+            findings += _level_on_slope(character, steps, terrain, ground, OFF_SKIN * motion.stature)
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
@@ -316,19 +318,10 @@ def _skin(
     over = _resting(height, skin)
     if over is None:
         return []
-    findings = []
+    findings: list[Finding] = []
     if abs(over) > OFF_SKIN * skin.height:
-        if _stands_level_on_slope(motion, steps, terrain, abs(over)):
-            slope = float(np.median(character.contacts.normal[character.contacts.touching][:, 2]))
-            return [
-                Finding(
-                    "level_on_slope",
-                    "error",
-                    f"The feet of '{motion.name}' stand level where '{ground}' slopes by "
-                    f"{np.degrees(np.arccos(slope)):.0f}°",
-                    "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
-                )
-            ]
+        if level := _level_on_slope(character, steps, terrain, ground, abs(over)):
+            return level
         side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
         findings.append(
             Finding(
@@ -345,6 +338,24 @@ def _skin(
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
     return findings
+
+
+def _level_on_slope(
+    character: CharacterLoads, steps: Sequence[Footprint], terrain: Terrain, ground: str, off: float
+) -> list[Finding]:
+    """Soles that lie level on ground that slopes, where they are `off` it [m], or without a skin may be."""
+    motion, contacts = character.motion, character.contacts
+    if not _stands_level_on_slope(motion, steps, terrain, off):
+        return []
+    slope = float(np.median(contacts.normal[contacts.touching][:, 2]))
+    return [
+        Finding(
+            "level_on_slope",
+            "error",
+            f"The feet of '{motion.name}' stand level where '{ground}' slopes by {np.degrees(np.arccos(slope)):.0f}°",
+            "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+        )
+    ]
 
 
 def _stands_level_on_slope(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:
