@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.motion.people import has_two_legs
 from ...core.motion.props import mass_properties
 from ...core.motion.sole_motion import shortest_length
 from ...core.motion.units import scale_to_metres
@@ -231,6 +232,16 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
     settings.animated_frames = start, end
 
 
+def has_legs(character: Any) -> bool:
+    """True if a character stands on two legs, as people do."""
+    return has_two_legs(character.joints.keys(), len(character.soles))
+
+
+def is_captured(character: Any) -> bool:
+    """True if a character is the skeleton of a person without a skin, as of motion capture."""
+    return has_legs(character) and not character.skin_mass > 0
+
+
 def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     """Scale a character whose file is in other units to metres, by an empty above it; the factor.
 
@@ -241,7 +252,7 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     """
     armature = character.armature
     size = stature_of(scene, armature) if armature else 0.0
-    factor = scale_to_metres(size)
+    factor = scale_to_metres(size, captured=is_captured(character))
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
     put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3

@@ -9,6 +9,7 @@ import bpy
 from ...core.errors import InputError
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.rig_mapping import instances_armature, parts_of, require_armature
+from ..rigs.worn_rigs import worn_rigs
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.rig_sampling import is_animated, is_simulated
 from ..sampling.skin_sampling import meshes_on
@@ -89,15 +90,14 @@ def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[b
 
 
 def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Object:
-    """The armature that moves the skin where another one controls it; itself if it does, or none is found."""
-    if armature.type != "ARMATURE" or meshes_on(scene, armature):
+    """The armature that moves the skin where another one controls it, or the body that wears it; itself if it does, or
+    none is found."""
+    if armature.type != "ARMATURE":
         return armature
-    followers = [
-        other
-        for other in scene.objects
-        if other.type == "ARMATURE" and armature in all_leaders(other) and meshes_on(scene, other)
-    ]
-    return followers[0] if len(followers) == 1 else armature
+    bodies = [obj for obj in scene.objects if obj.type == "ARMATURE" and meshes_on(scene, obj)]
+    moving = [armature] if armature in bodies else [obj for obj in bodies if armature in all_leaders(obj)]
+    wearers = {next((body for body in bodies if rig in worn_rigs(scene, body)), rig) for rig in moving}
+    return wearers.pop() if len(wearers) == 1 else armature
 
 
 def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:

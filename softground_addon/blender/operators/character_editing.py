@@ -9,6 +9,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core.errors import InputError
+from ...core.motion.people import likely_mass
 from .. import jobs, settings
 from ..characters import character_setup
 from ..characters.import_fixes import walk_ahead
@@ -81,17 +82,19 @@ class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
 
 
 MUCH = 2.0
-"""Ratio of a mass to that of the skin from which the panel suggests the latter."""
+"""Ratio of a mass to the likely one from which the panel suggests the latter."""
 
 
 def suggested_mass(character: Any) -> float:
-    """Mass that a character's skin suggests where its own differs much [kg], 0 where it does not."""
-    mass, skin = character.mass, character.skin_mass
-    return float(skin) if skin > 0 and not skin / MUCH < mass < skin * MUCH else 0.0
+    """Mass that a character's skin or its height suggests where its own differs much [kg], 0 where it does not."""
+    likely, _ = likely_mass(character.skin_mass, character.size, two_legs=character_setup.has_legs(character))
+    differs = likely > 0 and not likely / MUCH < character.mass < likely * MUCH
+    return float(likely) if differs else 0.0
 
 
 class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
-    """Set the mass from the volume of the character's skin, at the density of water"""
+    """Set the mass from the volume of the character's skin, at the density of water; for figures on two legs that
+    would be far too heavy, from their height"""
 
     bl_idname = "softground.mass_by_volume"
     bl_label = "Mass by Volume"
@@ -102,7 +105,8 @@ class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
         character = active_character(settings.options_of(context))
         if not character.skin_mass > 0:
             raise InputError(f"'{character_setup.title_of(character)}' has no skin to go by: type its mass.")
-        character.mass = character.skin_mass
+        legs = character_setup.has_legs(character)
+        character.mass, _ = likely_mass(character.skin_mass, character.size, two_legs=legs)
         return {"FINISHED"}
 
 

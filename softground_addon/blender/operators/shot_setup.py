@@ -25,6 +25,8 @@ from ..reading import analysis, shots
 from ..response import response_job
 from ..rigs import frame_ranges
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
+from ..sampling.rig_sampling import is_animated
+from ..sampling.skin_sampling import meshes_on
 from .modal_bake import Reading, Reports
 
 
@@ -84,6 +86,9 @@ def _add(
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", f"Added '{character.name}' with {soles}"))
+        elif is_animated(character.armature) and meshes_on(scene, character.armature):
+            what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
+            reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
         else:
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
     added = character_setup.add_props(scene, props) if props else []

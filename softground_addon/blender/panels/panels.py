@@ -12,6 +12,7 @@ from ...core.motion.motion import JOINTS
 from ...core.motion.units import scale_to_metres, wrong_unit
 from .. import session, settings
 from ..characters import selection
+from ..characters.character_setup import is_captured
 from ..characters.import_fixes import stature_of
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
@@ -76,19 +77,21 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             _scale(layout, settings.scene_of(context), character)
             _on_the_spot(layout, settings.scene_of(context), character)
             layout.prop(character, "mass")
-            if suggested_mass(character):
-                text = f"{suggested_mass(character):g} kg by Volume"
+            if mass := suggested_mass(character):
+                text = f"{mass:g} kg by {'Volume' if mass == character.skin_mass else 'Height'}"
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
 
 
 def _scale(layout: Any, scene: Any, character: Any) -> None:
     """What size a character has whose file is in other units, and a button that puts it right."""
     size = stature_of(scene, character.armature) if character.armature else 0.0
-    factor = scale_to_metres(size)
+    captured = is_captured(character)
+    factor = scale_to_metres(size, captured=captured)
     if factor == 1.0:
         return
     box = layout.box().column(align=True)
-    shown, unit = f"{size:.0f} m" if factor < 1 else f"{size * 100:.2g} cm", wrong_unit(size).partition(",")[0]
+    shown = f"{size:.0f} m" if factor < 1 else f"{size * 100:.2g} cm"
+    unit = wrong_unit(size, captured=captured).partition(",")[0]
     box.label(text=f"{shown} in size: made in {unit}", icon="ERROR", translate=False)
     box.operator("softground.fix_scale", text=f"Scale by {factor:g}", translate=False)
 

@@ -21,6 +21,7 @@ from ..ground.baked_ground import display_mesh_of
 from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
 from ..rigs.frame_ranges import ancestors, leaders
+from ..rigs.worn_rigs import worn_rigs
 from ..sampling.rig_sampling import object_named
 from ..sampling.skin_sampling import meshes_on
 from . import input_hashes
@@ -296,6 +297,9 @@ def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
         f"{input_hashes.of_shapes(worn)}"
         for worn in _worn_by(scene, character)
     ]
+    if character.armature:
+        rigs = worn_rigs(scene, settings.found(character.armature))
+        parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 
 

@@ -521,7 +521,10 @@ def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMa
     name = armature.name
     _check_mass(name, mass)
     if not mapping.soles:
-        raise InputError(f"'{name}' has no feet, and nothing else to print with: {CHOOSE_CONTACTS}.")
+        raise InputError(
+            f"'{name}' has no feet, and nothing else to print with: {CHOOSE_CONTACTS}. Remove it from the characters "
+            "if nothing of it touches the ground, as of what swims or flies."
+        )
     for source in mapping.soles:
         if not source.bone and not source.object:
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")

@@ -15,6 +15,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.rig.rig_skin import Indices, RigSkin, Shape
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries
+from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
 from ..settings import ObjectName, found, name_of
 from .seen_mesh import as_seen, left_out
 
@@ -28,7 +29,8 @@ _LEAST_WEIGHT = 1e-4
 def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
 
-    Beside rendered ones, those that are not are mostly stand-ins.
+    With those of rigs that it wears, if it has any by itself. Beside rendered ones, those that are not are mostly
+    stand-ins.
     """
     worn = _worn_by(scene, armature)
     return [obj for obj in worn if not obj.hide_render] or worn
@@ -51,9 +53,14 @@ def _is_on(obj: bpy.types.Object, bones: Collection[str]) -> bool:
 
 
 def _worn_by(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    return [
-        obj for obj in scene.objects if obj.type == "MESH" and (_deformed_by(obj, armature) or _hangs(obj, armature))
-    ]
+    worn = [obj for obj in scene.objects if obj.type == "MESH" and _wears(armature, obj)]
+    rigs = worn_rigs(scene, armature) if worn else []
+    more = (obj for obj in scene.objects if obj.type == "MESH" and any(_wears(rig, obj) for rig in rigs))
+    return list(dict.fromkeys([*worn, *more]))
+
+
+def _wears(armature: bpy.types.Object, obj: bpy.types.Object) -> bool:
+    return _deformed_by(obj, armature) or _hangs(obj, armature)
 
 
 def _deformed_by(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
@@ -75,8 +82,10 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
     InputError
         If one is being edited.
     """
-    pieces, rig = [], name_of(armature)
-    for name in [name_of(obj) for obj in meshes_on(scene, armature)]:
+    pieces, body = [], name_of(armature)
+    rigs = [armature, *worn_rigs(scene, armature)]
+    worn = [(obj, next(rig for rig in rigs if _wears(rig, obj))) for obj in meshes_on(scene, armature)]
+    for name, rig in [(name_of(obj), name_of(rig)) for obj, rig in worn]:
         obj, armature = found(name), found(rig)
         if obj.mode == "EDIT":
             raise InputError(f"'{obj.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first.")
@@ -88,6 +97,8 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
                 pieces.append(_hung(found(seen), armature, shapes))
             else:
                 pieces.append((yield from _deformed(seen, shapes, name, rig)))
+        if rig != body:
+            pieces[-1] = _carried(pieces[-1], found(rig), found(body))
         yield
     if not pieces:
         return None
@@ -135,11 +146,7 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
 
 def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape, ...]) -> _Piece:
     mesh, bone = _mesh_of(obj), armature.data.bones[obj.parent_bone]
-    parent = np.eye(4)
-    if not bone.use_relative_parent:
-        parent = np.array(bone.matrix_local)
-        parent[:3, 3] += parent[:3, 1] * bone.length
-    to_armature = parent @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis)
+    to_armature = _on_bone(obj, bone)
     count = len(mesh.vertices)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
@@ -150,6 +157,42 @@ def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape
         np.ones(count),
         _turned(to_armature, shapes),
         hung=True,
+    )
+
+
+def _on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
+    """The place of an object that hangs on a bone, in the space of the bone's armature at rest, (4, 4)."""
+    parent = np.eye(4)
+    if not bone.use_relative_parent:
+        parent = np.array(bone.matrix_local)
+        parent[:3, 3] += parent[:3, 1] * bone.length
+    return np.asarray(parent @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis))
+
+
+def _carried(piece: _Piece, rig: bpy.types.Object, body: bpy.types.Object) -> _Piece:
+    """A mesh on a rig that a body wears, as one on the body's bones that carry it."""
+    name, held = hung_on(rig, body), carriers(rig, body)
+    rest = (name, _on_bone(rig, body.data.bones[name])) if name else next(iter(held.values()))
+    names, matrices = zip(*(held.get(name, rest) for name in piece.names), strict=True) if piece.names else ((), ())
+    bones, number = np.unique(np.array(names, dtype=str), return_inverse=True)
+    to_body = np.array([*matrices, rest[1]])
+    count = len(piece.vertices)
+    alone = np.setdiff1d(np.arange(count), piece.vertex)  # what no bone moves
+    vertex = np.append(piece.vertex, alone)
+    group = np.append(piece.group, np.full(len(alone), len(names)))
+    weight = np.append(piece.weight, np.ones(len(alone)))
+    places = np.append(piece.vertices[vertex], np.ones((len(vertex), 1)), axis=1)
+    moved = weight[:, None] * np.einsum("nij,nj->ni", to_body[group, :3], places)
+    entry, of = np.unique(piece.vertex * len(bones) + number[piece.group], return_inverse=True)
+    return _Piece(
+        np.stack([np.bincount(vertex, along, count) for along in moved.T], axis=-1),
+        piece.triangles,
+        tuple(bones.tolist()),
+        entry // max(len(bones), 1),
+        entry % max(len(bones), 1),
+        np.asarray(np.bincount(of, piece.weight, len(entry)), dtype=float),
+        _turned(rest[1], piece.shapes),
+        piece.hung,
     )
 
 

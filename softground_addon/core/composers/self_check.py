@@ -20,6 +20,7 @@ from ..loads.missed_steps import advice, missed_steps
 from ..loads.missing_ground import beyond_edge
 from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion, LowSkin
+from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
 from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
@@ -48,10 +49,8 @@ STANDING_PERCENTILE = 20.0
 SOME_FRAMES = 200
 """Frames whose skin is looked up on the ground in one go."""
 
-PERSON_MASS, PERSON_LEG = 77.5, 0.87
-"""A person of 1.78 m [kg], hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
-MASS_RANGE = 4.0
-"""Ratio of mass to that of the body's skin, or of a person of the same leg length, beyond which it is asked about."""
+PERSON_LEG = 0.87
+"""A person of 1.78 m, hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
 APART = 0.02
 """Difference of the offsets of one character's feet that is no error of a pose, up to an adult's size [m]; of a larger
 one, it grows with the legs."""
@@ -108,6 +107,8 @@ def self_check(
         findings += yield from _edge(motion, steps, terrain, ground)
         if motion.skin is not None:
             findings += yield from _skin(character, motion.skin, steps, terrain, ground)
+        elif motion.stature > 0:
+            findings += _level_on_slope(character, steps, terrain, ground, OFF_SKIN * motion.stature)
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
@@ -175,16 +176,18 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
         )
     if motion.centre is not None:
         return  # a prop has no legs to go by
-    if unit := wrong_unit(motion.stature):
+    captured = motion.two_legs and all(sole.sole.underside is None for sole in motion.soles)
+    if unit := wrong_unit(motion.stature, captured=captured):
         size = f"{motion.stature:.0f} m" if motion.stature > 1 else f"{motion.stature * 100:.2g} cm"
         yield Finding(
             "unit_scale",
-            "error",
+            "error" if wrong_unit(motion.stature) else "warning",
             f"'{motion.name}' is {size} tall: its file is in {unit}.",
-            f"Press Scale by {scale_to_metres(motion.stature):g}, or leave it if the size is intended.",
+            f"Press Scale by {scale_to_metres(motion.stature, captured=captured):g}, or leave it if the size is "
+            "intended.",
         )
         return  # with its size, the mass that suits it changes
-    likely, by = motion.skin.mass if motion.skin else 0.0, "the volume of its skin"
+    likely, by = likely_mass(motion.skin.mass if motion.skin else 0.0, motion.size, two_legs=motion.two_legs)
     if not likely:
         likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "the length of its legs"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
@@ -322,19 +325,10 @@ def _skin(
     over = _resting(height, skin)
     if over is None:
         return []
-    findings = []
+    findings: list[Finding] = []
     if abs(over) > OFF_SKIN * skin.height:
-        if _stands_level_on_slope(motion, steps, terrain, abs(over)):
-            slope = float(np.median(character.contacts.normal[character.contacts.touching][:, 2]))
-            return [
-                Finding(
-                    "level_on_slope",
-                    "error",
-                    f"The feet of '{motion.name}' stand level where '{ground}' slopes by "
-                    f"{np.degrees(np.arccos(slope)):.0f}°",
-                    "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
-                )
-            ]
+        if level := _level_on_slope(character, steps, terrain, ground, abs(over)):
+            return level
         side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
         findings.append(
             Finding(
@@ -351,6 +345,24 @@ def _skin(
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
     return findings
+
+
+def _level_on_slope(
+    character: CharacterLoads, steps: Sequence[Footprint], terrain: Terrain, ground: str, off: float
+) -> list[Finding]:
+    """Soles that lie level on ground that slopes, where they are `off` it [m], or without a skin may be."""
+    motion, contacts = character.motion, character.contacts
+    if not _stands_level_on_slope(motion, steps, terrain, off):
+        return []
+    slope = float(np.median(contacts.normal[contacts.touching][:, 2]))
+    return [
+        Finding(
+            "level_on_slope",
+            "error",
+            f"The feet of '{motion.name}' stand level where '{ground}' slopes by {np.degrees(np.arccos(slope)):.0f}°",
+            "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+        )
+    ]
 
 
 def _stands_level_on_slope(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.interpolation import cubic, linear
+from .people import has_two_legs
 from .sole_motion import SoleMotion, _between, shortest_length
 from .units import scale_to_metres
 
@@ -110,6 +111,8 @@ class CharacterMotion:
         Where its skin is lowest, at the frames that were read.
     stature : float
         Height of its bones at rest [m], or a third of their length if it is low; 0 without a rig.
+    size : float
+        Largest extent of its bones at rest [m]; 0 without a rig.
     bones_move : bool
         True if some bone that was read moves, though it may carry no joint and no sole: a head that nods.
     """
@@ -127,6 +130,7 @@ class CharacterMotion:
     ground_level: float | None = None
     skin: LowSkin | None = None
     stature: float = 0.0
+    size: float = 0.0
     bones_move: bool = False
 
     @property
@@ -143,6 +147,11 @@ class CharacterMotion:
     def fall(self) -> float:
         """Gravity in the units of its file, as its stature tells them [m/s²]: one in centimetres moves as in metres."""
         return self.gravity / scale_to_metres(self.stature)
+
+    @property
+    def two_legs(self) -> bool:
+        """True if it stands on two legs, as people do."""
+        return not self.four_legged and has_two_legs(self.joints, len(self.soles))
 
     @property
     def stands_still(self) -> bool:

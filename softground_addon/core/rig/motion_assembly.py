@@ -26,7 +26,7 @@ from ..soles.foot_attitude import (
     standing_up,
 )
 from ..soles.soles import PlacedSole, prop_sole
-from .bones import RigBones, stature
+from .bones import RigBones, extent, stature
 from .mapping import RigMapping
 from .recording import Recording
 from .rig_at_rest import RestPose
@@ -123,6 +123,7 @@ def assemble_motion(
     if skin and joints and unknown_above and {*skin.bones} <= {*recording.bones}:
         joints[CENTRE] = centre_of_volume(skin, bones, recording)
 
+    heads = np.array([bone.head for bone in bones.values()])
     return CharacterMotion(
         name=name,
         mass=mass,
@@ -136,7 +137,8 @@ def assemble_motion(
         ground_level=stances.level if stances else None,
         skin=stances.skin if stances else None,
         bones_move=recording.bones_move,
-        stature=stature(np.array([bone.head for bone in bones.values()]), recording.armature[0]),
+        stature=stature(heads, recording.armature[0]),
+        size=extent(heads, recording.armature[0]),
     )
 
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.characters.import_fixes import size_of
+from softground_addon.blender.characters.import_fixes import size_of, stature_of
 from softground_addon.blender.compat import action_curves
 from softground_addon.core.motion.units import scale_to_metres
 from tests.blender import shots
@@ -124,3 +124,22 @@ def test_the_button_works_that_a_warning_names_of_a_rig_that_was_scaled_after_it
     factor = armature.parent.scale.x
     assert finding["remedy"].startswith(f"Press Scale by {factor:g}, or leave it")
     assert factor * scale == pytest.approx(1.0, rel=0.02)
+
+
+def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names(scene):
+    armature = shots.walker(scene, frames=30)
+    bpy.data.objects.remove(armature.children[0])
+    bpy.ops.softground.add_character()
+    assert scale_to_metres(stature_of(scene, armature), captured=True) == 1.0
+    armature.scale = (0.42 / stature_of(scene, armature),) * 3
+    bpy.context.view_layer.update()
+    scene.softground.cell_size = 0.01
+    (finding,) = (one for one in bake(scene).report["self_check"] if one["code"] == "unit_scale")
+    assert "is 42 cm tall: its file is in another unit." in finding["message"]
+    assert finding["remedy"].startswith("Press Scale by 4,")
+    bpy.ops.softground.clear_bake()
+    bpy.ops.softground.fix_scale()
+    bpy.context.view_layer.update()
+    assert stature_of(scene, armature) == pytest.approx(1.68, rel=0.01)
+    scene.softground.cell_size = 0.02
+    assert "unit_scale" not in codes(bake(scene).report)

@@ -151,6 +151,18 @@ def test_a_rig_without_feet_is_added_with_an_empty_list_that_bones_fill(scene, c
     assert bake(scene).report["steps"]
 
 
+def test_a_fish_that_touches_nothing_is_said_to_leave_no_print(scene, capfd):
+    armature = block(scene)
+    swims = {frame: (0, 0.3 + 0.05 * frame, 0.1 * frame) for frame in range(1, 31)}
+    rigs.key(armature, "location", swims, bone="Thing")
+    select(armature)
+    bpy.ops.softground.add_character()
+    said = capfd.readouterr().out
+    assert "Added 'Block', but nothing of its skin rests on the ground, as of what swims or flies: it leaves no" in said
+    with pytest.raises(InputError, match=r"Remove it from the characters if nothing of it touches the ground"):
+        bake(scene)
+
+
 def test_the_selected_vertices_of_a_skin_choose_the_bones_that_carry_them(scene):
     armature = stool()
     feet = [thing for thing in scene.objects if thing.name.endswith("foot")]

@@ -82,6 +82,8 @@ def test_feet_that_stand_level_on_a_slope_want_stairs_and_not_a_ground_of_anothe
     told = found(loads, Slope(slope=0.4))
     assert told.keys() == {code}
     assert ("slopes by 22°" in told[code].message) == ("Use Selected" in told[code].remedy) == (not turned)
+    skeleton = replace(loads, motion=replace(loads.motion, skin=None, stature=STATURE))
+    assert found(skeleton, Slope(slope=0.4)).keys() == ({"level_on_slope"} if not turned else set())
 
 
 def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_apart():
@@ -167,6 +169,39 @@ def test_a_body_of_another_unit_is_told_its_scale(size, remedy, unit):
     if remedy:
         assert remedy in findings["unit_scale"].remedy
         assert findings["unit_scale"].message.endswith(f"its file is in {unit}.")
+
+
+LEGS = {f"{joint}_{side}": np.zeros((1, 3)) for joint in ("hip", "knee", "ankle") for side in "lr"}
+
+
+@pytest.mark.parametrize(
+    ("size", "remedy"),
+    [(0.42, "by 4,"), (0.66, "by 2.54,"), (1.1, ""), (2.0, ""), (5.6, "by 0.3,"), (0.017, "by 100,")],
+)
+def test_a_skeleton_of_a_person_that_is_no_size_of_people_is_told_its_factor(size, remedy):
+    loads = stands()
+    bare = tuple(replace(sole, sole=replace(sole.sole, underside=None)) for sole in loads.motion.soles)
+    joints = {name: np.repeat(path, len(loads.motion.frames), axis=0) for name, path in LEGS.items()}
+    motion = replace(loads.motion, stature=size, soles=bare, joints={**loads.motion.joints, **joints})
+    findings = found(replace(loads, motion=motion))
+    assert ("unit_scale" in findings) == bool(remedy)
+    if remedy:
+        assert remedy in findings["unit_scale"].remedy
+        assert findings["unit_scale"].severity == ("warning" if size > 0.05 else "error")
+    has_skin = tuple(replace(sole, sole=replace(sole.sole, underside=np.zeros((1, 3)))) for sole in bare)
+    assert "unit_scale" not in {*found(replace(loads, motion=replace(motion, soles=has_skin)))} or size == 0.017
+
+
+@pytest.mark.parametrize("legs", [True, False])
+def test_a_figure_on_two_legs_with_the_volume_of_a_horse_is_told_what_people_of_its_height_weigh(legs):
+    loads = stands()
+    joints = {name: np.repeat(path, len(loads.motion.frames), axis=0) for name, path in LEGS.items()} if legs else {}
+    heavy = replace(loads.motion.skin, mass=950.0)
+    motion = replace(loads.motion, skin=heavy, size=1.77, joints={**loads.motion.joints, **joints})
+    findings = found(replace(loads, motion=replace(motion, mass=950.0)))
+    assert ("mass_of_size" in findings) == legs
+    if legs:
+        assert "a height of 1.77 m on two legs suggests about 76 kg" in findings["mass_of_size"].message
 
 
 @pytest.mark.parametrize("share", [1.0, 0.95, 0.5, 0.1])

@@ -1,0 +1,90 @@
+"""Rigs that a character wears: shoes, hair and skirts on armatures of their own that follow the body's bones."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..animation_layer.constraint_layer import is_own
+
+Array = NDArray[np.float64]
+Lead = tuple[bpy.types.Object, str]
+"""An armature and a bone of it that others follow."""
+
+_COPIES = {"COPY_TRANSFORMS", "COPY_LOCATION"}
+_HOLDS = _COPIES | {"CHILD_OF", "ARMATURE"}
+"""Constraints by which a bone goes where another one goes, and those by which it lies as that lies."""
+
+_FULL = 0.5
+"""Least influence of a constraint that counts."""
+
+
+def worn_rigs(scene: bpy.types.Scene, body: bpy.types.Object) -> list[bpy.types.Object]:
+    """The armatures that a body wears: they hang on its bones, or have no keys and go where its bones go."""
+    return [obj for obj in scene.objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
+
+
+def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> str:
+    """The bone of a body on which a rig hangs as an object; empty for none."""
+    return _leads(body, rig).get((rig.parent, rig.parent_bone), "") if rig.parent and rig.parent_type == "BONE" else ""
+
+
+def _wears(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    if hung_on(rig, body):
+        return True
+    animation = rig.animation_data
+    if animation and (animation.action or any(track.strips for track in animation.nla_tracks)):
+        return False
+    leads = _leads(body, rig)
+    led = [bone for bone in rig.pose.bones if any(lead in leads for _, lead in _followed(bone))]
+    # A body of its own whose animation is retargeted copies rotations, or reaches for places.
+    return bool(led) and all(_held(bone, leads) for bone in led)
+
+
+def _leads(body: bpy.types.Object, rig: bpy.types.Object) -> dict[Lead, str]:
+    """The bone of a body that goes where each of some bones goes, its own and, of the larger of two rigs that follow
+    the same one, those that it follows."""
+    leads = {(body, bone.name): bone.name for bone in body.data.bones}
+    if (len(body.data.bones), body.name) > (len(rig.data.bones), rig.name):
+        for bone in body.pose.bones:
+            leads |= {lead: bone.name for kind, lead in _followed(bone) if kind in _COPIES and lead[0] != rig}
+    return leads
+
+
+def _followed(bone: bpy.types.PoseBone) -> Iterator[tuple[str, Lead]]:
+    """What a bone follows in the world, by constraints that count."""
+    for constraint in bone.constraints:
+        if constraint.mute or constraint.influence < _FULL or is_own(constraint):
+            continue
+        each: Any = constraint
+        for target in each.targets if constraint.type == "ARMATURE" else [each]:
+            leader, name = getattr(target, "target", None), getattr(target, "subtarget", "")
+            if leader and name and (each.owner_space == "WORLD" or leader.matrix_world == bone.id_data.matrix_world):
+                yield constraint.type, (leader, name)
+
+
+def _held(bone: bpy.types.PoseBone, leads: Collection[Lead]) -> tuple[str, Lead] | None:
+    """By what kind of constraint a bone goes where one of the leads goes."""
+    return next((held for held in _followed(bone) if held[0] in _HOLDS and held[1] in leads), None)
+
+
+def carriers(rig: bpy.types.Object, body: bpy.types.Object) -> dict[str, tuple[str, Array]]:
+    """The bone of a body that carries each bone of a rig that it wears, and the matrix (4, 4) from the rig's space into
+    the body's, both at rest.
+
+    Bones that follow none go with those that they hang on.
+    """
+    leads, carrying = _leads(body, rig), {}
+    beside = np.array(body.matrix_world.inverted_safe() @ rig.matrix_world)
+    for bone in rig.pose.bones:
+        for node in (bone, *bone.parent_recursive):
+            if (held := _held(node, leads)) is not None:
+                kind, name = held[0], leads[held[1]]
+                lies = body.data.bones[name].matrix_local @ node.bone.matrix_local.inverted()
+                carrying[bone.name] = name, np.array(lies) if kind in _COPIES else beside
+                break
+    return carrying

@@ -1,0 +1,41 @@
+"""What two legs and a height tell of a body: that it is a person, what it weighs, and in what unit its file is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from math import floor, log10
+
+PERSON_MASS, PERSON_HEIGHT = 77.5, 1.78
+"""A person [kg], [m]."""
+
+MASS_RANGE = 4.0
+"""Ratio of a mass to the likely one beyond which it is asked about."""
+
+_LEGS = frozenset(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in "lr")
+
+
+def has_two_legs(joints: Collection[str], soles: int) -> bool:
+    """True for joints of two legs on which a body stands with as many soles."""
+    return _LEGS.issubset(joints) and soles == 2
+
+
+def likely_mass(by_volume: float, size: float, *, two_legs: bool) -> tuple[float, str]:
+    """Mass that suits a body [kg], to two digits, and by what; 0 where nothing tells it.
+
+    Parameters
+    ----------
+    by_volume : float
+        Of its skin [kg], 0 where unknown: figures with large heads and clothes of air weigh far less.
+    size : float
+        Largest extent of its joints [m], 0 where unknown.
+    two_legs : bool
+
+    Examples
+    --------
+    >>> likely_mass(950.0, 1.77, two_legs=True), likely_mass(950.0, 3.0, two_legs=False)
+    ((76.0, 'a height of 1.77 m on two legs'), (950.0, 'the volume of its skin'))
+    """
+    mass = PERSON_MASS * (size / PERSON_HEIGHT) ** 3
+    if two_legs and 0.0 < MASS_RANGE * mass < by_volume:
+        return round(mass, 1 - floor(log10(mass))), f"a height of {size:.3g} m on two legs"
+    return by_volume, "the volume of its skin" if by_volume else ""
