@@ -31,19 +31,13 @@ PAUSE = 0.005
 
 _ENDED = object()
 
-CLOSE_ENOUGH = 0.005
-"""Relative error of a depth that was typed."""
-TRIALS = 6
-"""Moduli that are tried for it."""
-
 
 @dataclass(frozen=True)
 class _Aim:
-    """A depth that was typed [m], the modulus that was set for it [Pa], and those tried before, with their depths."""
+    """A depth that was typed [m], and the modulus that was set for it [Pa]."""
 
     depth: float
     modulus: float
-    tried: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,7 +129,8 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     So a drag is answered at once.
     """
     material = scene.softground.material
-    material.youngs_modulus = next_modulus([(material.youngs_modulus, state.told[scene.session_uid])], depth)
+    law = settings.snapshot(scene).material
+    material.youngs_modulus = next_modulus([(material.youngs_modulus, state.told[scene.session_uid])], depth, law)
     state.told[scene.session_uid] = depth
     state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
 
@@ -146,22 +141,8 @@ def _aim_of(scene: bpy.types.Scene) -> _Aim | None:
     return aim if aim and scene.softground.material.youngs_modulus == aim.modulus else None
 
 
-def _put_right(scene: bpy.types.Scene) -> bool:
-    """Bring the stiffness nearer to what gives the depth that was typed last; whether there is more to do."""
-    aim, material = _aim_of(scene), scene.softground.material
-    depth = analysis.known_depth(known, settings.snapshot(scene)) if (known := analysis.known(scene)) else None
-    if aim is None or not depth or len(aim.tried) == TRIALS:
-        return False
-    if abs(depth - aim.depth) <= CLOSE_ENOUGH * aim.depth:
-        return False
-    tried = (*aim.tried, (aim.modulus, depth))
-    material.youngs_modulus = next_modulus(tried, aim.depth)
-    state.aims[scene.session_uid] = _Aim(aim.depth, material.youngs_modulus, tried)
-    return True
-
-
 def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
-    """Set the stiffness for the depth that was typed last, where the search for it has not ended, as a bake begins."""
+    """Set the stiffness for the depth that was typed last, unless it is set otherwise meanwhile."""
     aim, known = _aim_of(scene), analysis.known(scene)
     if aim is None or known is None:
         return
@@ -169,7 +150,8 @@ def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
     search = matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)
     with suppress(InputError):  # the stiffness that comes nearest stays
         modulus = yield from jobs.meanwhile(jobs.Progress("sample", 0.0), search)
-        scene.softground.material.youngs_modulus = modulus
+        if scene.softground.material.youngs_modulus == aim.modulus:
+            scene.softground.material.youngs_modulus = modulus
 
 
 def _work_out() -> float | None:
@@ -178,18 +160,18 @@ def _work_out() -> float | None:
         return SOON
     if not state.predicting:
         scenes = {window.scene for window in bpy.context.window_manager.windows}
-        state.predicting.extend(analysis.working_out_depth(scene) for scene in scenes if analysis.known(scene))
+        for work in (analysis.working_out_depth, settling):  # the last is done first
+            state.predicting.extend(work(scene) for scene in scenes if analysis.known(scene))
     until = time.perf_counter() + PART
     while state.predicting:
         if next(state.predicting[-1], _ENDED) is _ENDED:
             state.predicting.pop()
         elif time.perf_counter() > until and not bpy.app.background:
             return PAUSE
-    more = [_put_right(scene) for scene in {window.scene for window in bpy.context.window_manager.windows}]
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
-    return PAUSE if any(more) else None
+    return PAUSE if state.aims else None
 
 
 def unregister() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..ground.ground_law import load_at
 from ..ground.heightfield import HeightField
 from ..ground.material import MATERIAL_RANGES, GroundMaterial, Pressure
 from ..ground.soft_ground import SoftGround
@@ -39,12 +40,14 @@ BENEATH = 11
 """... and earlier ones, on which they tread."""
 STEPS_AT_ONCE, BODY_STEPS_AT_ONCE = 32, 1
 """Steps of a foot and of a body that are pressed in a slice."""
-MATCH_TOLERANCE = 2e-3
-"""Relative error of a matched depth."""
+MATCH_TOLERANCE, CLOSE_ENOUGH = 2e-3, 5e-3
+"""Relative error of a matched depth of the middle contacts, and of all."""
 FREE_TRIALS, MOST_TRIALS = 8, 40
 """Moduli that are tried before their interval is halved, and in all."""
 LEAST_POWER, MOST_POWER = 0.1, 3.0
-"""Range of the power by which the depth falls with the modulus."""
+"""Range of the power by which the load that a depth shows, over the modulus, falls with the modulus."""
+LEAST_LOAD = 1e-12
+"""Of a depth, over the modulus; less is none."""
 SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
 TAKES_NO_PRINT = (
     "No stiffness gives a print: the ground takes none under the feet. Check the masks, and the crust "
@@ -159,6 +162,8 @@ def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotCon
     beside = max(0, (len(among) - SAMPLE) // 2)
     sample = among[np.argsort(depths[among], kind="stable")][beside : len(among) - beside].tolist()
     beneath = _beneath(contacts, sample, prints)
+    for number in sample + beneath:
+        contacts[number].layout.remembers = True
     return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample, beneath)
 
 
@@ -229,16 +234,15 @@ def matching_modulus(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and that of the layer when "
             f"packed, {material.deepest * 100:.3g} cm."
         )
-    tried: list[tuple[float, float]] = []
-    modulus = material.youngs_modulus
-    while len(tried) < MOST_TRIALS:
-        reached = yield from typical_depth.slices(contacts, replace(material, youngs_modulus=modulus), pressure)
-        if abs(reached - depth) <= MATCH_TOLERANCE * depth:
-            return modulus
-        tried.append((modulus, reached))
-        if modulus == SOFTEST and reached < depth:
-            break
-        modulus = next_modulus(tried, depth)
+    middle = contacts.sample[(len(contacts.sample) - 1) // 2 : len(contacts.sample) // 2 + 1]
+    few = replace(contacts, sample=middle, beneath=[])
+    for among, tolerance in ((few, MATCH_TOLERANCE), (contacts, CLOSE_ENOUGH)):
+        tried = yield from _tried(among, material, depth, pressure, tolerance)
+        modulus, reached = tried[-1]
+        if matched := abs(reached - depth) <= tolerance * depth:
+            material = replace(material, youngs_modulus=modulus)
+    if matched:
+        return modulus
     if not any(reached for _, reached in tried):
         raise InputError(TAKES_NO_PRINT)
     raise InputError(
@@ -247,20 +251,40 @@ def matching_modulus(
     )
 
 
-def next_modulus(tried: Sequence[tuple[float, float]], depth: float) -> float:
-    """The modulus [Pa] to try next for a depth [m], after some with the depths that they gave; the latest last.
+def _tried(
+    contacts: ShotContacts, material: GroundMaterial, depth: float, pressure: Pressure, tolerance: float
+) -> Slices[list[tuple[float, float]]]:
+    """The moduli [Pa] on the way to a depth [m], from that of the material on, with the depths that they gave."""
+    tried: list[tuple[float, float]] = []
+    modulus = material.youngs_modulus
+    while len(tried) < MOST_TRIALS:
+        reached = yield from typical_depth.slices(contacts, replace(material, youngs_modulus=modulus), pressure)
+        tried.append((modulus, reached))
+        if abs(reached - depth) <= tolerance * depth or (modulus == SOFTEST and reached < depth):
+            break
+        modulus = next_modulus(tried, depth, material)
+    return tried
+
+
+def next_modulus(tried: Sequence[tuple[float, float]], depth: float, material: GroundMaterial) -> float:
+    """The modulus [Pa] to try next for a depth [m], after others with the depths that they gave; the latest last.
+
+    Follows the law of the material, under the load that the latest two show.
 
     Examples
     --------
-    >>> next_modulus([(2e5, 0.06)], 0.03)
+    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2))
     400000.0
+    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2, exponent=2.0))
+    800000.0
     """
     modulus, reached = tried[-1]
+    wanted, load = (max(float(load_at(at / material.layer_depth, material)), LEAST_LOAD) for at in (depth, reached))
     power = 1.0
     if len(tried) > 1 and tried[-2][0] != modulus and tried[-2][1] and reached:
-        fall = np.log(tried[-2][1] / reached) / np.log(modulus / tried[-2][0])
-        power = float(np.clip(fall, LEAST_POWER, MOST_POWER))
-    guess = modulus * (reached / depth) ** (1 / power)
+        before = float(load_at(tried[-2][1] / material.layer_depth, material))
+        power = float(np.clip(np.log(before / load) / np.log(modulus / tried[-2][0]), LEAST_POWER, MOST_POWER))
+    guess = modulus * (load / wanted) ** (1 / power)
     softer = [before for before, deep in tried if deep > depth]
     stiffer = [before for before, deep in tried if deep < depth]
     low, high = max(softer, default=SOFTEST), min(stiffer, default=STIFFEST)

@@ -27,7 +27,7 @@ LARGEST_SPREAD = 4
 class ContactLayout(ABC):
     """One sole from touching down to leaving, as it is laid out on the cells of the ground.
 
-    It remembers nothing of what was laid out or pressed: the same steps on the same cells give the same imprints.
+    It remembers nothing of what was pressed: the same steps on the same cells give the same imprints.
 
     Parameters
     ----------
@@ -46,7 +46,11 @@ class ContactLayout(ABC):
         Normal force at each step [N].
     lean : (N, 2) float array
         Which way the rim leans at each step; see `rim.leaning`.
+    remembers : bool
+        It keeps what does not depend on the material, as it is pressed into one after the other.
     """
+
+    remembers = False
 
     def __init__(self, character: str, sole: Sole, steps: Steps, *, strength: float = 1.0) -> None:
         self.character, self.sole, self.steps, self.strength = character, sole, steps, strength

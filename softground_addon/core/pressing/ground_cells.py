@@ -77,6 +77,7 @@ class GroundCells:
     ----------
     cell_size : float
         Side of a cell [m].
+    undisturbed : UndisturbedCells
     surface, factors
         See `UndisturbedCells`.
     material : GroundMaterial
@@ -84,7 +85,7 @@ class GroundCells:
     """
 
     def __init__(self, ground: SoftGround, undisturbed: UndisturbedCells) -> None:
-        self.ground, self.cell_size = ground, undisturbed.cell_size
+        self.ground, self.undisturbed, self.cell_size = ground, undisturbed, undisturbed.cell_size
         self.surface, self.factors = undisturbed.surface, undisturbed.factors
         self.material = ground.material.under(ground.gravity)
 

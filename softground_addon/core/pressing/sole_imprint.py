@@ -5,44 +5,36 @@ How much of the sole meets the ground is measured at points of its own (`sole_po
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
+from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
 from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
 from .deformation import touching_fraction
 from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps
 
 Array = NDArray[np.float64]
+PatchOverCells = tuple[NDArray[np.intp], Single, Single]
+"""See `patches_over_cells`."""
 
 NEGLIGIBLE_SHIFT = 0.02
 """Sideways shift of the underside by its height that need not be followed, in cells."""
 
 
 def cell_coverage(
-    sole: Sole,
-    transforms: Array,
-    ground: Surface,
-    *,
-    lowest: Array,
-    sinkage: Array,
-    tolerance: float,
-    divisions: int = 1,
+    patches: Iterable[PatchOverCells], fine: Window, *, sinkage: Array, tolerance: float, divisions: int = 1
 ) -> Single:
     """Fraction of each cell that is in contact, at each of N steps.
 
     Parameters
     ----------
-    sole : Sole
-    transforms : (N, P, 4, 4) float array
-        Poses of the patches.
-    ground : Surface
-        With cells that are `divisions` times smaller than those looked for.
-    lowest : (N,) float array
-        Height of the sole's lowest point above the undisturbed ground [m].
+    patches : iterable of PatchOverCells
+    fine : Window
+        Cells that are `divisions` times smaller than those looked for.
     sinkage : (N,) float array
         See `deformation.touching_fraction` [m].
     tolerance : float
@@ -54,9 +46,7 @@ def cell_coverage(
     -------
     (N, rows, columns) float array
     """
-    fine = ground.window
-    coverage = np.zeros((len(transforms), fine.cells), np.float32)
-    patches = patches_over_cells(sole, transforms, ground, lowest=lowest, tolerance=tolerance)
+    coverage = np.zeros((len(sinkage), fine.cells), np.float32)
     for number, (cells, clearance, covered) in enumerate(patches):
         touching = covered * touching_fraction(clearance, sinkage[:, None].astype(np.float32), tolerance)
         coverage[:, cells] = np.maximum(coverage[:, cells], touching) if number else touching
@@ -69,13 +59,19 @@ def cell_coverage(
 
 def patches_over_cells(
     sole: Sole, transforms: Array, ground: Surface, *, lowest: Array, tolerance: float
-) -> Iterator[tuple[NDArray[np.intp], Single, Single]]:
+) -> Iterator[PatchOverCells]:
     """Cover of the ground's cells by each patch of a sole, whether it touches them or not, at each of N steps.
 
     Parameters
     ----------
-    sole, transforms, ground, lowest, tolerance
-        See `cell_coverage`.
+    sole : Sole
+    transforms : (N, P, 4, 4) float array
+        Poses of the patches.
+    ground : Surface
+    lowest : (N,) float array
+        Height of the sole's lowest point above the undisturbed ground [m].
+    tolerance : float
+        See `deformation.touching_fraction` [m].
 
     Yields
     ------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,10 +13,10 @@ from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import Sinking, compression_rate, sink, target_compression, touching_fraction
-from .ground_cells import GroundCells, Imprints, Loads
+from .ground_cells import GroundCells, Imprints, Loads, UndisturbedCells
 from .pressure import pressure_field, spread_out
 from .rim import in_contact, rim_weights, whole_reach
-from .sole_imprint import cell_coverage
+from .sole_imprint import PatchOverCells, cell_coverage, patches_over_cells
 from .sole_points import PointContact, SolePoints, centroid, contact_window, places, point_contact
 
 Array = NDArray[np.float64]
@@ -36,6 +38,7 @@ class SoleLayout(ContactLayout):
     def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints, *, strength: float = 1.0) -> None:
         self.points = points
         self._width = points.width
+        self._remembered = cache(self._posed)
         super().__init__(character, sole, steps, strength=strength)
 
     def _window(self, start: int, end: int, cells: GroundCells) -> Window:
@@ -47,10 +50,9 @@ class SoleLayout(ContactLayout):
     ) -> Imprints:
         steps, points, material = slice(start - self.first, end - self.first), self.points, cells.material
         poses = self.steps.poses[steps]
-        divisions = points.cell_divisions(cells.cell_size)
-        surface = cells.surface(window)
-        ground = cells.surface(window, divisions) if divisions > 1 else surface
-        over_ground = point_contact(points, poses, ground)
+        posed = self._remembered if self.remembers else self._posed
+        over_ground, patches = posed(start, end, window, cells.undisturbed)
+        divisions, surface = points.cell_divisions(cells.cell_size), cells.surface(window)
         upright = self.steps.normals[steps, 2, None]
         area = (over_ground.area + over_ground.beyond) / upright
         factors = cells.factors(window)
@@ -75,10 +77,8 @@ class SoleLayout(ContactLayout):
         printing = over_ground.area / upright * fraction
         pressing = (sinking.target > 0) & printing.any(axis=1)
         coverage = cell_coverage(
-            self.sole,
-            poses,
-            ground,
-            lowest=over_ground.lowest,
+            patches,
+            window.refined(divisions),
             sinkage=sinking.sinkage,
             tolerance=points.tolerance,
             divisions=divisions,
@@ -112,6 +112,16 @@ class SoleLayout(ContactLayout):
                 self._middle(poses, over_ground, printing),
             ),
         )
+
+    def _posed(
+        self, start: int, end: int, window: Window, cells: UndisturbedCells
+    ) -> tuple[PointContact, list[PatchOverCells]]:
+        """The sole over the undisturbed ground at these steps: its points, and its patches over the cells."""
+        points, poses = self.points, self.steps.poses[start - self.first : end - self.first]
+        ground = cells.surface(window, points.cell_divisions(cells.cell_size))
+        contact = point_contact(points, poses, ground)
+        lowest, tolerance = contact.lowest, points.tolerance
+        return contact, list(patches_over_cells(self.sole, poses, ground, lowest=lowest, tolerance=tolerance))
 
     def _middle(self, poses: Array, over_ground: PointContact, touching: Array) -> Array:
         """Middle of the pressure at each step, on the undisturbed ground, (N, 3) [m]."""

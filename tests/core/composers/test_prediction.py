@@ -15,6 +15,7 @@ from softground_addon.core.composers.prediction import (
 )
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
+from softground_addon.core.ground.hand_hardness import plates, snow
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
@@ -108,6 +109,19 @@ def test_a_modulus_is_matched_to_a_depth_in_few_trials(share, options, monkeypat
     modulus = matching_modulus(contacts, material, share * contacts.typical, "UNIFORM")
     reached = typical_depth(contacts, replace(material, youngs_modulus=modulus), "UNIFORM")
     assert reached == pytest.approx(share * contacts.typical, rel=0.002)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.9, 1.5])
+@pytest.mark.parametrize("ground", [SNOW, snow(2.16), plates(13.19e3, 692e3, 0.5)], ids=["paper", "snow", "clay"])
+def test_a_typed_depth_costs_two_or_three_values_of_a_slider(ground, share):
+    """The middle contacts are searched by the law, the others check."""
+    pressure = "CENTRE_OF_PRESSURE"
+    contacts = predicted([walk(steps=8)], ground, pressure, cell=0.01)
+    value = len(list(typical_depth.slices(contacts, ground, pressure)))
+    search = matching_modulus.slices(contacts, ground, share * contacts.typical, pressure)
+    assert len(list(search)) < 3.3 * value
+    fresh = predicted([walk(steps=8)], ground, pressure, cell=0.01)
+    assert typical_depth(fresh, ground, pressure) == typical_depth(contacts, ground, pressure) == contacts.typical
 
 
 def test_a_depth_to_which_nothing_can_be_packed_is_refused_at_once(monkeypatch):

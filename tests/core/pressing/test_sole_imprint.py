@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.ground.heightfield import FlatTerrain, TerrainTiles
 from softground_addon.core.motion.sole_motion import Sole
-from softground_addon.core.pressing.sole_imprint import cell_coverage
+from softground_addon.core.pressing.sole_imprint import cell_coverage, patches_over_cells
 from softground_addon.core.pressing.sole_points import TOLERANCE, centroid, contact_window, point_contact, sole_points
 from tests.core.walkers import box_sole, foot_sole, pose, sphere_sole
 
@@ -33,10 +33,8 @@ def lay(sole, transforms, cell_size, *, terrain=None, sinkage=0.0):
     ground = TerrainTiles(terrain, cell_size / divisions).surface(window.refined(divisions))
     contact = point_contact(points, transforms, ground)
     coverage = cell_coverage(
-        sole,
-        transforms,
-        ground,
-        lowest=contact.lowest,
+        patches_over_cells(sole, transforms, ground, lowest=contact.lowest, tolerance=points.tolerance),
+        ground.window,
         sinkage=np.full(len(transforms), sinkage),
         tolerance=points.tolerance,
         divisions=divisions,
