@@ -191,12 +191,13 @@ def _calm(options: Any, units: SceneUnits) -> FeltWeather:
 
 def is_prop(character: Any) -> bool:
     """Whether an entry of the characters is of objects without a rig."""
-    return character.armature is None and any(sole.object for sole in character.soles)
+    return not (character.armature or character.body) and any(sole.object for sole in character.soles)
 
 
 def is_set_up(character: Any) -> bool:
-    """Whether an entry of the characters still has what leaves prints: an armature, or an object."""
-    return exists(character.armature) if character.armature else is_prop(character)
+    """Whether an entry of the characters still has what leaves prints: an armature, a body or an object."""
+    owner = character.armature or character.body
+    return exists(owner) if owner else is_prop(character)
 
 
 def character_of(character: Any) -> CharacterSettings:
@@ -213,7 +214,7 @@ def character_of(character: Any) -> CharacterSettings:
             tuple(sole.parts.keys()),
         )
         for sole in character.soles
-        if sole.object or (sole.bone and armature)
+        if sole.object or (sole.bone and (armature or character.body))
     )
     return CharacterSettings(
         armature=name_of(armature) if armature else None,
@@ -228,6 +229,7 @@ def character_of(character: Any) -> CharacterSettings:
             FootHold(one.foot, float(one.frame), one.mode, typed(one.strength), float(one.ease_in), float(one.ease_out))
             for one in character.holds
         ),
+        body=name_of(character.body) if character.body and not armature else None,
     )
 
 

@@ -21,6 +21,7 @@ from ..ground.baked_ground import display_mesh_of
 from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
 from ..rigs.frame_ranges import ancestors, leaders
+from ..sampling.body_sampling import meshes_of
 from ..sampling.rig_sampling import object_named
 from ..sampling.skin_sampling import meshes_on
 from . import input_hashes
@@ -182,6 +183,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
     nameless = [
         {**one, "name": "", "armature": bool(one["armature"])}
         | {"soles": [{**sole, "object": bool(sole["object"])} for sole in one["soles"]]}
+        | ({"body": True} if "body" in one else {})
         for one in inputs["characters"]
     ]
     compared = {**inputs, "ground": "", "characters": nameless}
@@ -253,8 +255,11 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
 
 
 def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
-    """The armature and the objects of a character."""
-    return [*([settings.found(character.armature)] if character.armature else []), *_things_of(character)]
+    """The armature, or the body with its meshes, and the objects of a character."""
+    owner = character.armature or character.body
+    owners = [settings.found(owner)] if owner else []
+    parts = [part for part in _worn_by_body(character) if part not in owners]
+    return [*owners, *parts, *_things_of(character)]
 
 
 def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
@@ -263,7 +268,11 @@ def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
 
 
 def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_on(scene, settings.found(character.armature)) if character.armature else []
+    return meshes_on(scene, settings.found(character.armature)) if character.armature else _worn_by_body(character)
+
+
+def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
+    return meshes_of(settings.found(character.body)) if character.body else []
 
 
 def bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
