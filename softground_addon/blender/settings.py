@@ -198,12 +198,13 @@ def _calm(options: Any, units: SceneUnits) -> FeltWeather:
 
 def is_prop(character: Any) -> bool:
     """Return whether an entry of the characters is of objects without a rig."""
-    return character.armature is None and any(sole.object for sole in character.soles)
+    return not (character.armature or character.body) and any(sole.object for sole in character.soles)
 
 
 def is_set_up(character: Any) -> bool:
-    """Return whether an entry of the characters still has what leaves prints: an armature, or an object."""
-    return exists(character.armature) if character.armature else is_prop(character)
+    """Return whether an entry of the characters still has what leaves prints: an armature, a body or an object."""
+    owner = character.armature or character.body
+    return exists(owner) if owner else is_prop(character)
 
 
 def character_of(character: Any) -> CharacterSettings:
@@ -220,7 +221,7 @@ def character_of(character: Any) -> CharacterSettings:
             tuple(sole.parts.keys()),
         )
         for sole in character.soles
-        if sole.object or (sole.bone and armature)
+        if sole.object or (sole.bone and (armature or character.body))
     )
     return CharacterSettings(
         armature=name_of(armature) if armature else None,
@@ -237,6 +238,7 @@ def character_of(character: Any) -> CharacterSettings:
             )
             for hold in character.holds
         ),
+        body=name_of(character.body) if character.body and not armature else None,
     )
 
 

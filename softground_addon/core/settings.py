@@ -89,7 +89,7 @@ class CharacterSettings:
     Attributes
     ----------
     armature : ObjectName or None
-        None for props without a rig.
+        None for props without a rig, and for bodies.
     name : str
         What the user calls it.
     mass_kg : float
@@ -101,6 +101,9 @@ class CharacterSettings:
     soles : tuple of SoleSource
     holds : tuple of FootHold
         How Clean Feet holds single contacts.
+    body : ObjectName or None
+        The mesh that moves its own parts, or the empty above rigid ones, of a body without an armature; the bones of
+        its soles are parts of it.
     """
 
     armature: ObjectName | None
@@ -112,6 +115,7 @@ class CharacterSettings:
     joints: Mapping[str, tuple[str, str]]
     soles: tuple[SoleSource, ...]
     holds: tuple[FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
+    body: ObjectName | None = field(default=None, metadata={"said_if_on": True})
 
 
 @dataclass(frozen=True)

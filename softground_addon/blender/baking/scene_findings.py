@@ -11,13 +11,16 @@ import numpy as np
 from ...core.findings import Finding, listed
 from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
+from .. import settings
 from ..characters.selection import all_leaders
 from ..compat import HAS_SLOTS, slot_of
 from ..ground.still_ground import changes_shape
 from ..reading import staleness
 from ..reading.shots import Shot
 from ..rigs.frame_ranges import playing_tracks
+from ..sampling.body_sampling import deforms, meshes_of
 from ..sampling.instances import crowd_finding, instancers
+from ..sampling.rig_sampling import object_named
 
 UPRIGHT = 0.9998
 """Gravity whose downward part is less than this points elsewhere (1°)."""
@@ -39,7 +42,8 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *(finding for motion in shot.motions for finding in _distance(motion, wanted)),
         *_idle_actions(followed, first, last),
         *_idle_drivers(followed),
-        *shape_findings(mover for mover in movers if mover.type == "MESH"),
+        *shape_findings(object_named(sole.object) for one in wanted.characters for sole in one.soles if sole.object),
+        *_followed_shapes(wanted),
         *_crowds(scene, wanted),
         *_gravity(scene, wanted),
     ]
@@ -137,6 +141,19 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
         if held
         else "correct its expression and variables in the Drivers editor, or remove it.",
     )
+
+
+def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
+    """Bodies without an armature, whose contacts are parts of a shape that changes."""
+    for one in wanted.characters:
+        if one.body and any(map(deforms, meshes_of(settings.found(one.body)))):
+            yield Finding(
+                "followed_shape",
+                "note",
+                f"'{one.name}' has no armature: its contacts {listed(sole.name for sole in one.soles)} are parts that "
+                "keep their shape while it changes.",
+                "Check in Contacts that each foot is there, and remove what is none.",
+            )
 
 
 def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:

@@ -15,23 +15,25 @@ from ...core.motion.props import mass_properties
 from ...core.motion.sole_motion import shortest_length
 from ...core.motion.units import scale_to_metres
 from ...core.numerics.components import components
+from ...core.rig.bare_body import body_motion
 from ...core.rig.mapping import RigMapping
 from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..rigs.frame_ranges import ancestors, animated_frames
 from ..rigs.libraries import check_libraries
-from ..rigs.rig_mapping import CHOOSE_CONTACTS, require_armature
+from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature
+from ..sampling.body_sampling import body_frames
 from ..sampling.prop_extraction import surface_of
 from ..sampling.rig_sampling import is_simulated, recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .import_fixes import put_under, size_of, stature_of
-from .recognition import SHARE, Recognised, recognise
+from .recognition import SHARE, Recognised, recognise, recognise_body
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
 
 def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> SoftGroundCharacter:
-    """Add an armature to the scene's characters, with its joints and feet as they were recognised.
+    """Add an armature, or an empty above rigid parts, to the scene's characters, with joints and feet as recognised.
 
     The first character sets the bake's frame range to its animation; further ones widen it.
 
@@ -48,6 +50,10 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
 
     Where no feet are found its list of soles is empty, for the user to fill.
     """
+    if armature is not None and parts_of(armature):
+        body = yield from adding_body(scene, armature)
+        assert body, "an empty is no prop"
+        return body
     require_armature(armature)
     assert armature is not None
     settings = scene.softground
@@ -72,6 +78,40 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     return character
 
 
+def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[SoftGroundCharacter | None]:
+    """Add a body that no armature moves, in steps: an empty above rigid parts, or a mesh that moves its own.
+
+    Nothing is changed before the last step. None where a mesh is rigid or nothing of it rests: it may be a prop.
+
+    Raises
+    ------
+    InputError
+        If it is a character already, if its meshes cannot be read, or if parts below an empty are no figure.
+    """
+    settings = scene.softground
+    if any(character.body == body for character in settings.characters):
+        raise InputError(f"'{body.name}' is already a character: remove it first to recognise it again.")
+    name, frames = name_of(body), body_frames(scene, body)
+    recognised = yield from recognise_body(scene, name)
+    assert recognised.body is not None
+    if not recognised.mapping.soles:
+        if found(name).type == "MESH":
+            return None
+        nowhere = f"none of them rests on the ground in frames {frames[0]}-{frames[1]}"
+        raise InputError(only_parts(found(name), "they keep one pose" if recognised.body.is_rigid else nowhere))
+    length = yield from _shortest_sole(scene, found(name), recognised)
+    character = settings.characters.add()
+    character.name, character.body = name.name, found(name)
+    _fill(scene, character, recognised.mapping)
+    character.mass = recognised.mapping.mass or character.mass
+    settings.active_character = len(settings.characters) - 1
+    stretch = time_stretch_of(scene)
+    _take_frames(scene, (round(frames[0] * stretch), round(frames[1] * stretch)))
+    character.sole_length = length
+    _fit_ground(scene)
+    return character
+
+
 LONGEST_OF_LIMBS = 0.55
 """Length from which a limb or an object counts as no longer, since it prints with a part of itself [m]: cells of 1 cm
 along a preset's 55."""
@@ -88,7 +128,10 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
     if recording is not None:
         poses = recording.of(np.arange(0, len(recording.frames), max(1, len(recording.frames) // _POSES)))
         count = len(poses.frames)
-        reading = recorded_motion(scene, armature, mapping, poses, recognised.skin, mass=1.0)
+        if recognised.body:
+            reading = body_motion(armature.name, recognised.body, mapping, poses, mass=1.0)
+        else:
+            reading = recorded_motion(scene, armature, mapping, poses, recognised.skin, mass=1.0)
     else:
         first, last = _frames_of_scene(scene, animated_frames(scene, armature))
         frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
@@ -285,7 +328,8 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
 
 
 def _fill(scene: bpy.types.Scene, character: SoftGroundCharacter, mapping: RigMapping) -> None:
-    character.skin_mass, character.size = mapping.mass, size_of(scene, character.armature)
+    character.skin_mass = mapping.mass
+    character.size = size_of(scene, character.armature) if character.armature else 0.0
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:
@@ -386,6 +430,8 @@ def add_object_contacts(
         raise InputError(
             "No object is selected: select the meshes that touch the ground, such as a cane or a snowshoe."
         )
+    if character.body:
+        raise InputError(f"'{character.name}' has no armature, and prints with its own parts: add a prop by itself.")
     for obj in props:
         _check_printable(scene, obj)
     for obj in props:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.numerics.rigid import unit
 from ...core.numerics.slices import Slices
+from ...core.rig.bare_body import BareBody, with_toes
 from ...core.rig.bones import RigBones
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.recording import Recording
@@ -18,10 +19,11 @@ from ...core.rig.rig_skin import FollowedSkin, RigSkin, followed_skin
 from ...core.rig.skin_mass import skin_mass
 from ...core.rig.skin_stances import UNDERSIDE
 from ...core.rig.sole_extraction import bone_families
-from ...core.settings import SoleSource
+from ...core.settings import ObjectName, SoleSource
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
+from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_sampling import is_animated, record
 from ..sampling.skin_sampling import read_skin
 from ..settings import found, name_of, units_of
@@ -51,11 +53,14 @@ class Recognised:
         If it has one.
     recording : Recording or None
         Of the bones of skin and mapping, where a skin moves.
+    body : BareBody or None
+        If no armature moves it.
     """
 
     mapping: RigMapping
     skin: RigSkin | None = None
     recording: Recording | None = None
+    body: BareBody | None = None
 
 
 def recognise(
@@ -107,6 +112,26 @@ def recognise(
         return Recognised(replace(mapping, mass=mass), skin)
     seen = yield from jobs.meanwhile(read, _shown_by_skin(bones, skin, recording))
     return Recognised(replace(_joined(bones, skin, mapping, seen), mass=mass), skin, recording)
+
+
+def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recognised]:
+    """Contacts of a body without an armature: none where it is rigid, or none of its parts rests on the ground.
+
+    Raises InputError if its meshes cannot be read.
+    """
+    read = jobs.Progress("sample", SHARE)
+    body = yield from jobs.counted(read_body(scene, name), "sample", POSES, share=SHARE / 2)
+    if body.is_rigid:
+        return Recognised(RigMapping(method="skin"), body=body)
+    first, last = body_frames(scene, found(name))
+    samples = range(first, min(last, first + MOST_FRAMES) + 1)
+    reading = record_body(scene, name, body, samples, units_of(scene))
+    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
+    mass = yield from jobs.meanwhile(read, weighing)
+    seen = yield from jobs.meanwhile(read, _shown_by_skin(body.bones, body.skin, recording))
+    soles = with_toes(seen, recording)
+    return Recognised(RigMapping(soles=soles, method="skin", mass=mass), body.skin, recording, body)
 
 
 def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:

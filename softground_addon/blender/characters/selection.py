@@ -7,19 +7,21 @@ from collections.abc import Iterable, Sequence
 import bpy
 
 from ...core.errors import InputError
+from .. import jobs
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.rig_mapping import instances_armature, parts_of, require_armature
 from ..rigs.worn_rigs import worn_rigs
+from ..sampling.body_sampling import deforms
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.rig_sampling import is_animated, is_simulated
 from ..sampling.skin_sampling import meshes_on
-from .character_setup import add_character
+from .character_setup import add_character, adding_body
 
 
 def chosen(
     scene: bpy.types.Scene, active: bpy.types.Object | None, selected: Iterable[bpy.types.Object]
 ) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
-    """Armatures and other objects that are to be added to a scene's characters.
+    """Armatures, or empties above figures without one, and other objects that are to be added to a scene's characters.
 
     Where what is selected neither is a rig nor moves, such as a camera or Blender's first cube, the one rig of the
     scene that does is meant.
@@ -42,9 +44,8 @@ def chosen(
     if fresh or moving:
         return fresh, moving if fresh else props
     walkers = [rig for rig in walkers_of(scene) if rig not in known]
-    for obj in picked:
-        if any(map(moves, parts_of(obj))):
-            require_armature(obj)
+    if bodies := [obj for obj in picked if is_body(obj)]:
+        return bodies, []
     if len(walkers) == 1:
         return walkers, []
     if not props:
@@ -52,6 +53,11 @@ def chosen(
             raise InputError(f"Several rigs move here ({_names(walkers)}): select those that walk.")
         require_armature(active)
     return [], props
+
+
+def is_body(obj: bpy.types.Object) -> bool:
+    """True of an empty above mesh objects that move without an armature: they may be a figure."""
+    return any(moves(part) and not is_simulated(part) for part in parts_of(obj))
 
 
 def _check_no_crowd(scene: bpy.types.Scene, picked: Sequence[bpy.types.Object]) -> None:
@@ -74,8 +80,8 @@ def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
 
 
 def moves(obj: bpy.types.Object) -> bool:
-    """Return whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
-    return is_animated(obj) or is_simulated(obj)
+    """Return whether keys, drivers, constraints, a parent or a simulation could move a mesh, or its vertices."""
+    return is_animated(obj) or is_simulated(obj) or deforms(obj)
 
 
 def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -122,6 +128,8 @@ def walkers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 def set_up_automatically(scene: bpy.types.Scene) -> None:
     """Make the scene's only rig that moves a skin, or moves at all, a character where none is set up yet.
 
+    Without any rig, its only body of parts that move.
+
     Raises
     ------
     InputError
@@ -134,6 +142,11 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
         inside = next(filter(instances_armature, scene.objects), None)
         if inside:
             require_armature(inside)
+        bodies = [obj for obj in scene.objects if not obj.parent and (is_body(obj) or deforms(obj))]
+        if len(bodies) == 1:
+            _leave_as_it_is(scene)
+            if jobs.run(adding_body(scene, bodies[0])):
+                return
         raise InputError(
             f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
             "with Add Character in the SoftGround panel."
@@ -144,12 +157,17 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             f"Scene '{scene.name}' has several armatures ({_names(rigs)}): select those that walk, press Add "
             "Character in the SoftGround panel, and save the file."
         )
+    _leave_as_it_is(scene)
+    add_character(scene, rigs[0])
+
+
+def _leave_as_it_is(scene: bpy.types.Scene) -> None:
+    """Settings where nobody looks on."""
     options = scene.softground
     if not options.is_property_set("sink_feet"):
-        options.sink_feet = False  # nobody looks on here: an animation is changed where that was asked for
+        options.sink_feet = False  # an animation is changed where that was asked for
     if not options.is_property_set("relief"):
         options.relief = "OFF"  # and farms bake what they have baked so far
-    add_character(scene, rigs[0])
 
 
 def _names(props: Sequence[bpy.types.Object]) -> str:

@@ -148,7 +148,8 @@ class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
 
 
 def _walking_ahead(scene: bpy.types.Scene, character: Any) -> jobs.Job[Reports]:
-    name, rig = character_setup.title_of(character), character.armature and settings.name_of(character.armature)
+    name, mover = character_setup.title_of(character), character.armature or character.body
+    rig = mover and settings.name_of(mover)
     known = yield from analysis.reading(scene)
     belt = known.belts.get(name)
     if belt is None or rig is None:

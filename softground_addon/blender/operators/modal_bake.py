@@ -463,10 +463,12 @@ def _why_not(context: bpy.types.Context) -> str:
 
 
 def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
-    """Scene, ground, armatures and soles that a job reads: their names, by their identifiers in this session."""
+    """Scene, ground, rigs, bodies and soles that a job reads: their names, by their identifiers in this session."""
     options = scene.softground
     soles = [sole.object for character in options.characters for sole in character.soles]
-    blocks = (scene, options.ground, *(character.armature for character in options.characters), *soles)
+    rigs = [rig for character in options.characters for rig in (character.armature, character.body)]
+    parts = [part for rig in rigs if rig for part in rig.children_recursive]
+    blocks = (scene, options.ground, *rigs, *parts, *soles)
     return {block.session_uid: block.name for block in blocks if block}
 
 

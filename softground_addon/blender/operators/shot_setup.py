@@ -25,6 +25,7 @@ from ..reading import analysis, shots
 from ..response import response_job
 from ..rigs import frame_ranges
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
+from ..sampling.body_sampling import deforms
 from ..sampling.rig_sampling import is_animated
 from ..sampling.skin_sampling import meshes_on
 from .modal_bake import Reading, Reports
@@ -81,8 +82,14 @@ def _add(
 ) -> jobs.Job[Reports]:
     rigs, props = selection.chosen(scene, active, selected)
     reports: Reports = []
-    for name in [settings.name_of(rig) for rig in rigs]:
-        character = yield from character_setup.adding_character(scene, settings.found(name))
+    remaining = [settings.name_of(prop) for prop in props]
+    for name in [settings.name_of(obj) for obj in (*rigs, *filter(deforms, props))]:
+        is_rig = name not in remaining
+        adding = character_setup.adding_character if is_rig else character_setup.adding_body
+        character = yield from adding(scene, settings.found(name))
+        if character is None:  # it prints as a prop
+            continue
+        remaining = [prop for prop in remaining if prop != name]
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", f"Added '{character.name}' with {soles}"))
@@ -91,6 +98,7 @@ def _add(
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
         else:
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
+    props = [settings.found(prop) for prop in remaining]
     added = character_setup.add_props(scene, props) if props else []
     if added:
         reports.append(("INFO", "Added " + ", ".join(f"'{entry.name}' of {entry.mass:g} kg" for entry in added)))

@@ -12,7 +12,7 @@ from ...core.motion.motion import JOINTS
 from ...core.motion.units import scale_to_metres, wrong_unit
 from .. import session, settings
 from ..characters import selection
-from ..characters.character_setup import is_captured
+from ..characters.character_setup import is_captured, title_of
 from ..characters.import_fixes import stature_of
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
@@ -30,7 +30,8 @@ class SOFTGROUND_UL_characters(Listed):
     """Characters by name, each with its armature."""
 
     def draw_row(self, layout: Any, item: Any) -> None:
-        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_prop(item) else "ERROR"
+        icon = "MESH_UVSPHERE" if is_prop(item) else "OUTLINER_OB_MESH" if item.body else "ERROR"
+        icon = "ARMATURE_DATA" if item.armature else icon
         layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
 
 
@@ -99,7 +100,8 @@ def _scale(layout: Any, scene: Any, character: Any) -> None:
 def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
     """That a character walks in place, and a button that lets it travel."""
     predicted = prediction.of(scene)
-    if character.armature is None or predicted is None or character.armature.name not in predicted.analysis.belts:
+    title = title_of(character)
+    if is_prop(character) or predicted is None or title not in predicted.analysis.belts:
         return
     box = layout.box().column(align=True)
     box.label(text="Walks on the spot", icon="INFO")
@@ -154,6 +156,10 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
         layout.operator("softground.add_contact", icon="PLUS")
         sole = active_sole(scene.softground)
         if not sole:
+            return
+        if character.body:
+            layout.prop(sole, "side")
+            layout.prop(sole, "kind")
             return
         if character.armature:
             bones = character.armature.data

@@ -114,6 +114,11 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_armature,
     )
+    body: PointerProperty(
+        name="Body",
+        description="Mesh that moves its own parts, or empty above rigid ones, where no armature does",
+        type=bpy.types.Object,
+    )
     mass: FloatProperty(
         name="Mass (kg)",
         description="Mass in kilograms, with clothes and load. Heavier characters leave deeper prints",

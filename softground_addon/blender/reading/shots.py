@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -32,6 +33,7 @@ from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..response.character_keys import ReadRig, controls_of
 from ..rigs.rig_mapping import require_armature
+from ..sampling.body_sampling import sample_body
 from ..sampling.control_poses import RigPoses
 from ..sampling.prop_extraction import check_props
 from ..sampling.rig_sampling import check_rig, sample_character, sample_prop
@@ -90,7 +92,8 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     settings.forget_deleted_ground(scene)
     setting_paths.check_stored(scene.softground)
     for character in scene.softground.characters:
-        if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
+        rig = character.armature or character.body
+        if rig is None and character.soles and not any(s.object or s.bone for s in character.soles):
             raise InputError(
                 f"The object of '{character.name}' was deleted: choose another one in Contacts, or remove "
                 f"'{character.name}' from the characters."
@@ -192,6 +195,7 @@ def sample_characters(
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, character in enumerate(wanted.characters):
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
+        job: Generator[int | None, None, CharacterMotion]
         if character.armature:
             armature = settings.found(character.armature)
             if wanted.response:
@@ -210,6 +214,11 @@ def sample_characters(
                 below=below,
                 units=wanted,
                 findings=findings,
+            )
+        elif character.body:
+            mass, skin_mass = character.mass_kg, character.skin_mass_kg
+            job = sample_body(
+                scene, character.body, mapping, mass=mass, frames=frames, units=wanted, skin_mass=skin_mass
             )
         else:
             job = sample_prop(

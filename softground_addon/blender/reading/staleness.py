@@ -22,6 +22,7 @@ from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.worn_rigs import worn_rigs
+from ..sampling.body_sampling import meshes_of
 from ..sampling.rig_sampling import object_named
 from ..sampling.skin_sampling import meshes_on
 from . import input_hashes
@@ -192,6 +193,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
     nameless = [
         {**character, "name": "", "armature": bool(character["armature"])}
         | {"soles": [{**sole, "object": bool(sole["object"])} for sole in character["soles"]]}
+        | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
     compared = {**inputs, "ground": "", "characters": nameless, "hard_grounds": len(inputs.get("hard_grounds", ()))}
@@ -267,8 +269,11 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
 
 
 def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
-    """The armature and the objects of a character."""
-    return [*([settings.found(character.armature)] if character.armature else []), *_things_of(character)]
+    """The armature, or the body with its meshes, and the objects of a character."""
+    owner = character.armature or character.body
+    owners = [settings.found(owner)] if owner else []
+    parts = [part for part in _worn_by_body(character) if part not in owners]
+    return [*owners, *parts, *_things_of(character)]
 
 
 def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
@@ -277,7 +282,11 @@ def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
 
 
 def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_on(scene, settings.found(character.armature)) if character.armature else []
+    return meshes_on(scene, settings.found(character.armature)) if character.armature else _worn_by_body(character)
+
+
+def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
+    return meshes_of(settings.found(character.body)) if character.body else []
 
 
 def bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:

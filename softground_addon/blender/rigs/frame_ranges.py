@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import ceil, floor, inf
 from typing import Any
 
@@ -33,6 +33,22 @@ def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int,
     first = min(starts) if -inf not in starts else start if start < keyed[1] or inf in ends else keyed[0]
     last = max(ends) if inf not in ends else end if end > first else keyed[1]
     return floor(first), ceil(last)
+
+
+def frames_with_shapes(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[int, int]:
+    """First and last frame of the scene in which objects or their shape keys are animated; all of it without keys."""
+    ranges = [each for obj in objects for each in (animated_frames(scene, obj), _of_shape_keys(obj)) if each]
+    if not ranges:
+        return scene.frame_start, scene.frame_end
+    stretch = time_stretch_of(scene)
+    return floor(min(first for first, _ in ranges) / stretch), ceil(max(last for _, last in ranges) / stretch)
+
+
+def _of_shape_keys(obj: bpy.types.Object) -> Range | None:
+    keys = getattr(obj.data, "shape_keys", None)
+    ranges = list(_of_data(keys.animation_data)) if keys and keys.animation_data else []
+    finite = [end for each in ranges for end in each if abs(end) < inf]
+    return (min(finite), max(finite)) if finite else None
 
 
 def _ranges(obj: bpy.types.Object, followers: frozenset[bpy.types.Object]) -> Iterator[Range]:

@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import InputError
+from ...core.findings import listed
 from ...core.rig.bones import RestBone, RigBones
 from ...core.rig.mapping import BoneEnd, RigMapping
 from ...core.settings import SoleSource
@@ -128,6 +129,15 @@ def parts_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
     return [] if any(part.type == "ARMATURE" for part in below) else [part for part in below if part.type == "MESH"]
 
 
+def only_parts(top: bpy.types.Object, reason: str = "") -> str:
+    """Refusal of an empty above mesh objects, and the reason for which they are no figure."""
+    return (
+        f"'{top.name}' has no armature, only mesh objects below it: select those that touch the ground (of "
+        f"{listed(part.name for part in parts_of(top))}) and press Add Character; each prints as a rigid body."
+        f"{reason and f' As one figure they print nothing, as {reason}.'}"
+    )
+
+
 def require_armature(armature: bpy.types.Object | None) -> None:
     """Raise InputError unless the object is an armature with bones."""
     if armature is None:
@@ -141,11 +151,8 @@ def require_armature(armature: bpy.types.Object | None) -> None:
             f"The armature of '{armature.name}' is in a collection instance and cannot be read there: make it real "
             "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
         )
-    if parts := parts_of(armature):
-        raise InputError(
-            f"'{armature.name}' has no armature, only mesh objects below it: select those that touch the ground (of "
-            f"{', '.join(repr(part.name) for part in parts)}) and press Add Character; each prints as a rigid body."
-        )
+    if parts_of(armature):
+        raise InputError(only_parts(armature))
     if armature.type != "ARMATURE":
         raise InputError(
             f"'{armature.name}' is not an armature but of type {armature.type.title()}: select the character's "

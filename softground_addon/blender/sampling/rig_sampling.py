@@ -105,7 +105,7 @@ def sample_character(
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
     check_rig(scene, armature, mapping, mass)
-    _check_frames(frames)
+    check_frames(frames)
     bones = [*bones_of(mapping), *(poses.bones if poses else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
@@ -211,10 +211,10 @@ def sample_prop(
     scene, mass, frames, units, findings
         As for `sample_character`; and so is what it yields, returns and raises.
     """
-    _check_mass(name, mass)
+    check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
     check_props(scene, name, sources)
-    _check_frames(frames)
+    check_frames(frames)
     props = list(dict.fromkeys(source.object for source in sources))
     handled = yield from _moved_by_handlers(scene, "", frames, [], props)
     recording = yield from _evaluate(scene, "", frames, [], units, props, handled=handled)
@@ -339,9 +339,10 @@ def sampling_scene(
     props: Sequence[str],
     shapes: Sequence[tuple[str, str]] = (),
     *,
+    meshes: Sequence[str] = (),
     handled: bool = False,
 ) -> Iterator[str]:
-    """Name of a scene in which only the given bones, objects and shape keys are evaluated.
+    """Name of a scene in which only the given bones, objects and shape keys are evaluated, and the meshes of some.
 
     It is gone afterwards, whatever happens.
 
@@ -355,7 +356,8 @@ def sampling_scene(
         try:
             for setting in _SCENE_TIME:
                 setattr(temporary.render, setting, getattr(scene.render, setting))
-            for obj, bone in (*((armature, bone) for bone in bones), *((obj, "") for obj in props)):
+            of_vertices = ((obj, "any vertices") for obj in meshes)  # depends on the mesh, if no group has that name
+            for obj, bone in (*((armature, bone) for bone in bones), *((obj, "") for obj in props), *of_vertices):
                 dependence = probe.constraints.new("COPY_LOCATION")
                 dependence.target, dependence.subtarget = object_named(obj), bone
             for obj, key in shapes:
@@ -499,12 +501,14 @@ def _let_handlers_act(scene: bpy.types.Scene, frame: int, subframe: float = 0.0)
         scene.frame_set(frame, subframe=subframe)
 
 
-def _check_frames(frames: range) -> None:
+def check_frames(frames: range) -> None:
+    """Raise InputError where there are no frames."""
     if not frames or frames.step < 0:
         raise InputError(f"The frame range {frames.start} to {frames.stop - 1} is empty: set a start before the end.")
 
 
-def _check_mass(name: str, mass: float) -> None:
+def check_mass(name: str, mass: float) -> None:
+    """Raise InputError where a mass is none."""
     if not (np.isfinite(mass) and mass > 0):
         raise InputError(f"The mass of '{name}' is {mass} kg: give it a positive mass.")
 
@@ -519,7 +523,7 @@ def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMa
     """
     require_armature(armature)
     name = armature.name
-    _check_mass(name, mass)
+    check_mass(name, mass)
     if not mapping.soles:
         raise InputError(
             f"'{name}' has no feet, and nothing else to print with: {CHOOSE_CONTACTS}. Remove it from the characters "

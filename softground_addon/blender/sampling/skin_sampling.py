@@ -91,7 +91,7 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
             raise InputError(f"'{obj.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first.")
         check_libraries(obj)
         with as_seen(obj) as (seen, shapes):
-            if not len(_mesh_of(found(seen)).polygons):
+            if not len(mesh_of(found(seen)).polygons):
                 continue
             if _hangs(obj, armature):
                 pieces.append(_hung(found(seen), armature, shapes))
@@ -138,14 +138,15 @@ class _Piece:
     hung: bool = False
 
 
-def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+def mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh of a mesh object."""
     mesh = obj.data
     assert isinstance(mesh, bpy.types.Mesh), obj.name
     return mesh
 
 
 def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape, ...]) -> _Piece:
-    mesh, bone = _mesh_of(obj), armature.data.bones[obj.parent_bone]
+    mesh, bone = mesh_of(obj), armature.data.bones[obj.parent_bone]
     to_armature = _on_bone(obj, bone)
     count = len(mesh.vertices)
     return _Piece(
@@ -200,7 +201,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
     """A mesh of that name where the object `placed` is."""
     vertex, group, weight = yield from _weights(name)
     obj, armature = found(name), found(rig)
-    mesh, bones = _mesh_of(obj), armature.data.bones
+    mesh, bones = mesh_of(obj), armature.data.bones
     count = len(mesh.vertices)
     names = tuple(group.name for group in obj.vertex_groups)
     if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
@@ -225,7 +226,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
 def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
     """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
     read, tables = 0, [np.empty((0, 3))]
-    while read < len(vertices := _mesh_of(found(name)).vertices):
+    while read < len(vertices := mesh_of(found(name)).vertices):
         piece = enumerate(vertices[read : read + _SLICE], read)
         entries = [x for index, vertex in piece for each in vertex.groups for x in (index, each.group, each.weight)]
         tables.append(np.array(entries, dtype=float).reshape(-1, 3))
