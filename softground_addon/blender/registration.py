@@ -11,8 +11,16 @@ from . import handlers, properties, session, state
 from .command_line import cli
 from .ground import look
 from .importing import import_capture
-from .live import live
-from .operators import add_weather, bake_result, character_editing, modal_bake, prediction, sample_scene, show_prints
+from .operators import (
+    add_weather,
+    bake_result,
+    character_editing,
+    live_footprints,
+    modal_bake,
+    prediction,
+    sample_scene,
+    show_prints,
+)
 from .operators import shot_setup as operators
 from .output import event_points, export_formats, force_curves, make_sound
 from .panels import (
@@ -44,7 +52,7 @@ CLASSES = (
     *character_editing.CLASSES,
     *sample_scene.CLASSES,
     *modal_bake.CLASSES,
-    *live.CLASSES,
+    *live_footprints.CLASSES,
     *overlay.CLASSES,
     *preset_menu.CLASSES,
     *force_curves.CLASSES,
