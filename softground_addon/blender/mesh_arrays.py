@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.numerics.slices import Slices, sliced
+
 Indices = NDArray[np.intp]
+
+AT_ONCE = 1 << 17
+"""Faces that are looked at together: a hundredth of a second."""
 
 
 def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
@@ -29,49 +35,115 @@ def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     return corners
 
 
-def add_faces(mesh: bpy.types.Mesh, corner_vertex: NDArray[np.integer], face_start: NDArray[np.integer]) -> None:
-    """Add faces to a mesh without, by the vertex of each corner (L,) and the first corner of each face (P,)."""
+def add_faces(
+    mesh: bpy.types.Mesh,
+    corner_vertex: NDArray[np.integer],
+    face_start: NDArray[np.integer],
+    edges: NDArray[np.int32],
+    corner_edge: NDArray[np.int32],
+) -> None:
+    """Add faces to a mesh without, and edges as of `face_edges`, which Blender would look for in one step.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    corner_vertex : (L,) int array
+        Vertex of each corner.
+    face_start : (P,) int array
+        First corner of each face.
+    edges : (E, 2) int32 array
+        Vertices of each edge.
+    corner_edge : (L,) int32 array
+        Edge from each corner to the next.
+    """
+    mesh.edges.add(len(edges))
     mesh.loops.add(len(corner_vertex))
-    if len(corner_vertex):
-        attribute: Any = mesh.attributes[".corner_vert"]
-        attribute.data.foreach_set("value", corner_vertex.astype(np.int32))
     mesh.polygons.add(len(face_start))
+    for name, values in ((".edge_verts", edges), (".corner_vert", corner_vertex), (".corner_edge", corner_edge)):
+        if len(values):
+            attribute: Any = mesh.attributes[name]  # a hundred times faster than `edges` and `loops`
+            attribute.data.foreach_set("value", values.astype(np.int32, copy=False).ravel())
     mesh.polygons.foreach_set("loop_start", face_start.astype(np.int32))
 
 
 def triangles(mesh: bpy.types.Mesh) -> Indices:
     """Vertices of the triangles that Blender shows the faces as, (T, 3)."""
-    corners, _ = triangle_corners(mesh)
-    return corner_vertices(mesh).astype(np.intp)[corners]
+    return triangle_vertices(read_faces(mesh))
 
 
-def triangle_corners(mesh: bpy.types.Mesh) -> tuple[Indices, Indices]:
-    """Corners of the triangles that Blender shows the faces as, (T, 3), and the face of each, (T,).
+@dataclass(frozen=True)
+class Faces:
+    """Faces as they are read of a mesh, to be split into triangles.
+
+    Attributes
+    ----------
+    positions : (V, 3) float32 array
+        Of the vertices.
+    corner_vertex : (L,) int array
+        Vertex of each corner, face by face.
+    triangle_face : (T,) int array
+        Face of each triangle.
+    corners : (T, 3) int array, optional
+        Corners of each triangle, where faces have more than four.
+    size : (P,) int array
+        Corners of each face.
+    """
+
+    positions: NDArray[np.float32]
+    corner_vertex: NDArray[np.int32]
+    triangle_face: NDArray[np.int32]
+    corners: Indices | None
+    size: Indices
+
+
+def read_faces(mesh: bpy.types.Mesh) -> Faces:
+    """The faces of a mesh, of which nothing else need be asked."""
+    mesh.calc_loop_triangles()
+    face = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangle_polygons.foreach_get("value", face)
+    count, corners = np.bincount(face, minlength=len(mesh.polygons)), None
+    if count.min(initial=1) < 1 or count.max(initial=0) > 2:
+        asked = np.empty(len(face) * 3, dtype=np.int32)
+        mesh.loop_triangles.foreach_get("loops", asked)
+        corners = asked.reshape(-1, 3).astype(np.intp)
+    return Faces(positions(mesh), corner_vertices(mesh), face, corners, count + 2)
+
+
+@sliced
+def triangle_vertices(faces: Faces) -> Slices[Indices]:
+    """Vertices of the triangles that Blender shows faces as, (T, 3)."""
+    corners = yield from triangle_corners.slices(faces)
+    yield
+    vertices: Indices = faces.corner_vertex.take(corners).astype(np.intp)
+    return vertices
+
+
+@sliced
+def triangle_corners(faces: Faces) -> Slices[Indices]:
+    """Corners of the triangles that Blender shows faces as, (T, 3).
 
     What Blender does to faces of up to four corners is repeated here, thirty times faster than it can be asked: two
     triangles at the diagonal from the first corner, or at the other one where that lies outside of the face
     (`mesh_tessellate.cc`).
     """
-    mesh.calc_loop_triangles()
-    face = np.empty(len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangle_polygons.foreach_get("value", face)
-    count = np.bincount(face, minlength=len(mesh.polygons))
-    if count.min(initial=1) < 1 or count.max(initial=0) > 2:
-        corners = np.empty(len(face) * 3, dtype=np.int32)
-        mesh.loop_triangles.foreach_get("loops", corners)
-        return corners.reshape(-1, 3).astype(np.intp), face.astype(np.intp)
-    first = np.cumsum(count + 2) - (count + 2)
+    if faces.corners is not None:
+        return faces.corners
+    face, place, vertex = faces.triangle_face, faces.positions, faces.corner_vertex
+    first = np.cumsum(faces.size) - faces.size
     start = first[face]
     second = np.zeros(len(face), dtype=np.intp)
     second[1:] = face[1:] == face[:-1]
     second += start
+    yield
     corners = np.stack([start, second + 1, second + 2], axis=-1)
-    quads = first[count == 2]
-    place, vertex = positions(mesh), corner_vertices(mesh)
-    bent = quads[_has_outer_diagonal(*(place[vertex[quads + corner]] for corner in range(4)))]
-    half = np.searchsorted(start, bent)
-    corners[half], corners[half + 1] = bent[:, None] + (0, 1, 3), bent[:, None] + (1, 2, 3)
-    return corners, face.astype(np.intp)
+    quads = first[faces.size == 4]
+    for begin in range(0, len(quads), AT_ONCE):
+        yield
+        part = quads[begin : begin + AT_ONCE]
+        bent = part[_has_outer_diagonal(*(place.take(vertex.take(part + corner), axis=0) for corner in range(4)))]
+        half = np.searchsorted(start, bent)
+        corners[half], corners[half + 1] = bent[:, None] + (0, 1, 3), bent[:, None] + (1, 2, 3)
+    return corners
 
 
 def _has_outer_diagonal(*corners: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -11,12 +11,12 @@ from . import handlers, properties, session, state
 from .command_line import cli
 from .ground import look
 from .importing import import_capture
-from .live import live
 from .operators import (
     add_weather,
     bake_result,
     character_editing,
     hard_ground,
+    live_footprints,
     modal_bake,
     prediction,
     sample_scene,
@@ -54,7 +54,7 @@ CLASSES = (
     *hard_ground.CLASSES,
     *sample_scene.CLASSES,
     *modal_bake.CLASSES,
-    *live.CLASSES,
+    *live_footprints.CLASSES,
     *overlay.CLASSES,
     *preset_menu.CLASSES,
     *force_curves.CLASSES,

@@ -5,6 +5,7 @@ of all threads, which other programs on the machine disturb less than the clock'
 """
 
 import time
+from contextlib import ExitStack
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 from softground_addon.blender.ground import created_ground
 from softground_addon.blender.live import live
+from softground_addon.blender.settings import found
 from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.ground.heightfield import FlatTerrain
 from tests.blender.shots import walker
@@ -30,7 +32,8 @@ def ground_of(scene):
     scene.softground.cell_size = EXTENT / SIDE
     half = np.array([EXTENT / 2 - 0.02, EXTENT / 2 - 0.02])
     layout = created_ground.lay_out(GroundPlan(-half, half, FlatTerrain()), EXTENT / SIDE, 1.0)
-    with created_ground.draft(layout) as ground:
+    with ExitStack() as drafts:
+        ground = found(created_ground.draft(drafts, layout))
         scene.collection.objects.link(ground)
     scene.softground.ground = ground
     bpy.context.view_layer.update()

@@ -39,7 +39,6 @@ from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, counted, meanwhile
-from ..materials.materials import drafted
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of, read_shot, settings_of
 from ..response import response_job
@@ -239,15 +238,11 @@ def _created(
     drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan, trail: Trail
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
-    layout = yield from meanwhile(Progress("write", 0.2), created_ground.laid_out(wanted, plan))
+    creating = created_ground.created(drafts, wanted, plan)
+    name, layout = yield from meanwhile(Progress("write", 0.2), creating)
     yield Progress("write", 0.3)
-    drafts.enter_context(drafted(wanted.surface))
-    yield Progress("write", 0.3)
-    name = settings.name_of(
-        drafts.enter_context(created_ground.draft(layout, created_ground.soft_edge(wanted.margin_m)))
-    )
-    yield Progress("write", 0.3)
-    return baked_ground.on_created(scene, settings.found(name), layout, trail, wanted.surface)
+    index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
+    return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 
 
 CLOSE_UP_FROM = 1.5
@@ -275,7 +270,7 @@ def _given(
     name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
-        Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
+        Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
@@ -285,16 +280,16 @@ def _given(
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    coarse = trail_detail.surface_of(ground, unit_scale)
+    coarse = yield from meanwhile(Progress("write", 0.2), trail_detail.surface_of.slices(ground, unit_scale))
     refinement = yield from meanwhile(
         Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
-    drafted_name = settings.name_of(drafts.enter_context(trail_detail.draft(settings.found(name), coarse, refinement)))
-    yield Progress("write", 0.4)
+    drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
+    drafted_name = yield from meanwhile(Progress("write", 0.4), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
-        Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
+        Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

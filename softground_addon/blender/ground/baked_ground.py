@@ -19,14 +19,13 @@ from ...core.playback.playback_curves import Spans
 from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
 from ...core.record.footprints import Footprint
-from ...core.record.pressed_ground import GroundSample, Trail
+from ...core.record.pressed_ground import GroundSample
 from ...core.settings import ObjectName
 from ..debris import debris_object
 from ..jobs import Job, Progress
 from ..playback import own_data, playback
 from ..settings import exists, found, name_of
 from . import created_ground, ground_checks, ground_mesh, hidden_ground, trail_detail
-from .created_ground import Layout
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -99,16 +98,14 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
-def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, trail: Trail, surface: str) -> Place:
+def on_created(scene: bpy.types.Scene, draft: ObjectName, index: Indices, vertices: Array, surface: str) -> Place:
     """A ground that is not in the scene yet."""
-    index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
-    name = name_of(draft)
 
     def publish() -> bpy.types.Object:
-        created_ground.publish(scene, found(name), surface)
-        return found(name)
+        created_ground.publish(scene, found(draft), surface)
+        return found(draft)
 
-    return Place(index, layout.vertices[index], name, publish)
+    return Place(index, vertices[index], draft, publish)
 
 
 def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:

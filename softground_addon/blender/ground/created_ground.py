@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
 from ...core.ground.material import GroundMaterial
+from ...core.meshing.face_edges import face_edges
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.numerics.slices import Slices, sliced
-from ...core.settings import BakeSettings
+from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
-from ..materials.materials import EDGE, ensure_material
+from ..materials.materials import EDGE, drafted, ensure_material
 from ..mesh_arrays import add_faces
 from ..settings import find, found, name_of
 from .ground_mesh import discard, mesh_of, write_positions
@@ -57,22 +58,19 @@ class Layout:
     face_size: NDArray[np.intp]
 
 
-def laid_out(wanted: BakeSettings, plan: GroundPlan) -> Slices[Layout]:
-    """The ground that is to be made for a plan: with its margin, and fine where the camera comes close."""
-    return lay_out.slices(
+def created(drafts: ExitStack, wanted: BakeSettings, plan: GroundPlan) -> Slices[tuple[ObjectName, Layout]]:
+    """A draft of a ground for a plan: with its margin, and fine where the camera comes close; its material is there."""
+    layout = yield from lay_out.slices(
         plan.widened(wanted.margin_m, wanted.camera),
         wanted.cell_size_m,
         wanted.unit_scale_m,
         reach=reach_of(wanted.material),
         close_up=_close_up(wanted, plan),
     )
-
-
-def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, layout: Layout) -> bpy.types.Object:
-    """A new ground with the material of the preset, set as the scene's ground."""
-    with draft(layout, soft_edge(wanted.margin_m)) as ground:
-        publish(scene, ground, wanted.surface)
-    return ground
+    yield
+    drafts.enter_context(drafted(wanted.surface))
+    yield
+    return (yield from draft.slices(drafts, layout, soft_edge(wanted.margin_m))), layout
 
 
 def soft_edge(margin: float) -> float:
@@ -144,38 +142,44 @@ def lay_out(
     return Layout(vertices, local, location, grid.corner_vertex, grid.face_size)
 
 
-@contextmanager
-def draft(layout: Layout, edge: float = 0.0) -> Iterator[bpy.types.Object]:
-    """The ground as an object that is in no scene yet; one that is in none at the end is taken away.
+@sliced
+def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[ObjectName]:
+    """The ground as an object that is in no scene yet; one that is in none as `drafts` close is taken away.
 
     Its material fades out over the width of its edge [m].
     """
-    name = name_of(_built(layout, edge))
-    try:
-        yield found(name)
-    finally:
-        if (left := find(name)) is not None and not left.users_collection:
-            discard(left)
-
-
-@none_left_if_it_fails()
-def _built(layout: Layout, edge: float) -> bpy.types.Object:
-    mesh = bpy.data.meshes.new("SoftGround")
-    mesh.vertices.add(len(layout.local))
-    write_positions(mesh, layout.local)  # before there are faces, which it would look at
-    add_faces(mesh, layout.corner_vertex, np.cumsum(layout.face_size) - layout.face_size)
-    mesh.update(calc_edges=True)
+    corner_vertex, face_start = layout.corner_vertex, np.cumsum(layout.face_size) - layout.face_size
+    edges = yield from face_edges.slices(corner_vertex, face_start)
+    yield
+    with none_left_if_it_fails():
+        mesh = bpy.data.meshes.new("SoftGround")
+        mesh.vertices.add(len(layout.local))
+        write_positions(mesh, layout.local)  # before there are faces, which it would look at
+        add_faces(mesh, corner_vertex, face_start, *edges)
+        ground = bpy.data.objects.new("SoftGround", mesh)
+        ground.location = layout.location.tolist()
+        name = name_of(ground)
+    drafts.callback(_discard_unpublished, name)
+    del edges
+    yield
+    mesh = mesh_of(found(name))
+    mesh.update()
     mesh.shade_smooth()
+    yield
     uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
-    layer = mesh.uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
-    layer.uv.foreach_set("vector", (uv / uv.max())[layout.corner_vertex].ravel())
+    layer = mesh_of(found(name)).uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
+    layer.uv.foreach_set("vector", (uv / uv.max())[corner_vertex].ravel())
+    yield
     if edge > 0:
         inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
-        fading = mesh.attributes.new(EDGE, "FLOAT", "POINT")
+        fading: Any = mesh_of(found(name)).attributes.new(EDGE, "FLOAT", "POINT")
         fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
-    ground = bpy.data.objects.new("SoftGround", mesh)
-    ground.location = layout.location.tolist()
-    return ground
+    return name
+
+
+def _discard_unpublished(name: ObjectName) -> None:
+    if (left := find(name)) is not None and not left.users_collection:
+        discard(left)
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:

@@ -8,7 +8,7 @@ footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
@@ -23,7 +23,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.numerics.slices import Slices, sliced
 from ...core.record.footprints import NEVER
-from ...core.record.pressed_ground import GroundSample, Trail
+from ...core.record.pressed_ground import GroundSample
 from .. import mesh_arrays
 from ..compat import remove_scene
 from ..playback import display_key, own_data, playback, weather_modifier
@@ -85,11 +85,13 @@ def parts_of(vertices: Array) -> list[Array]:
 
 
 @sliced
-def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Slices[Indices]:
-    """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
+def pressed_vertices(
+    vertices: Array, covers: Callable[[Array, Array], NDArray[np.bool_]], terrain: Terrain
+) -> Slices[Indices]:
+    """Which of the vertices (V, 3) lie on top of the surface at places (x, y) that are covered, (K,)."""
     pressed = []
     for number, part in enumerate(parts_of(vertices)):
-        near = np.flatnonzero(trail.covers(part[:, 0], part[:, 1]))
+        near = np.flatnonzero(covers(part[:, 0], part[:, 1]))
         yield
         x, y, z = part[near].T
         pressed.append(number * AT_ONCE + near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE])
@@ -149,32 +151,37 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     return vertices
 
 
+@sliced
 def undisturbed_surface(
     ground: bpy.types.Object, unit_scale: float, painted: painted_ground.Names = ()
-) -> GroundSurface:
+) -> Slices[GroundSurface]:
     """The ground as it is without any bake, in world space and metres, with what is painted on it.
+
+    Blender is asked for nothing after the first slice.
 
     Raises
     ------
     InputError
         If the surface has points that are no numbers.
     """
-    mesh = mesh_of(ground)
+    mesh, name = mesh_of(ground), ground.name
     vertices = rest_vertices(ground, unit_scale)
     to_world = to_world_of(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
-        surface, triangles = vertices, mesh_arrays.triangles(mesh)
+        surface, faces = vertices, mesh_arrays.read_faces(mesh)
         factors = painted_ground.factors(ground, mesh, painted)
     else:
         with undisturbed_copy(ground) as evaluated:
-            surface = _transform(to_world, mesh_arrays.positions(evaluated))
-            triangles = mesh_arrays.triangles(evaluated)
+            faces = mesh_arrays.read_faces(evaluated)
+            surface = _transform(to_world, faces.positions)
             factors = painted_ground.factors(ground, evaluated, painted)
         if len(surface) == len(vertices):
             vertices = surface
+    yield
+    triangles = yield from mesh_arrays.triangle_vertices.slices(faces)
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
-    return GroundSurface(ground.name, vertices, surface, triangles, factors)
+    return GroundSurface(name, vertices, surface, triangles, factors)
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, cast
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.meshing.face_edges import face_edges
 from ...core.meshing.refinement import Refinement, Surface
+from ...core.numerics.slices import Slices, sliced
+from ...core.settings import ObjectName
 from .. import mesh_arrays
+from ..drafts import none_left_if_it_fails
 from ..playback import own_data
+from ..settings import found
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,89 +42,156 @@ NOT_COPIED = ("position", "custom_normal")
 SEAM = ".uv_seam"
 """Seams, as 4.2 to 4.4 call them; other names with a leading dot are Blender's own."""
 
+_EMPTY: Indices = np.empty((0, 2), dtype=np.intp)
 
-def surface_of(mesh: bpy.types.Mesh, to_world: Array) -> Surface:
-    """The faces of a mesh with world positions [m], and the triangles that Blender shows them as."""
-    positions = mesh_arrays.positions(mesh).astype(np.float64)
-    corners, face = mesh_arrays.triangle_corners(mesh)
-    size = np.bincount(face, minlength=len(mesh.polygons)) + 2
+
+@sliced
+def surface_of(faces: mesh_arrays.Faces, to_world: Array) -> Slices[Surface]:
+    """Faces with world positions [m], and the triangles that Blender shows them as."""
+    corners = yield from mesh_arrays.triangle_corners.slices(faces)
+    yield
     return Surface(
-        vertices=positions @ to_world[:3, :3].T + to_world[:3, 3],
-        corner_vertex=mesh_arrays.corner_vertices(mesh).astype(np.intp),
-        face_start=np.concatenate([[0], np.cumsum(size)]),
+        vertices=faces.positions.astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3],
+        corner_vertex=faces.corner_vertex.astype(np.intp),
+        face_start=np.concatenate([[0], np.cumsum(faces.size)]),
         triangle_corners=corners,
-        triangle_face=face,
+        triangle_face=faces.triangle_face.astype(np.intp),
     )
 
 
-def build(
-    name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refinement, groups: Sequence[str] = ()
-) -> bpy.types.Mesh:
-    """A new mesh: the kept faces of the source and the new ones, with all that the source carries.
+@dataclass(frozen=True)
+class _Layer:
+    """An attribute: its name, type and domain, and its values, (N, ...)."""
+
+    name: str
+    kind: str
+    domain: str
+    values: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Carried:
+    """All that the faces, corners, edges and vertices of a mesh carry, to be given to a refined copy of it.
+
+    Attributes
+    ----------
+    positions : (V, 3) float32 array
+    edges, loose_edges : (E, 2) int array
+        Vertices of its edges if attributes are on them, and of those without a face, which no face would bring back.
+    layers : tuple of _Layer
+    uv_maps : tuple of (str, bool, bool)
+        Name of each, and whether it is active, and rendered.
+    colours : dict of str to str
+        Names of the colours that are active and rendered, by the property that says so.
+    groups : tuple of str
+        Names of the vertex groups, which only its object knows.
+    members : (N, 3) float array
+        Group, vertex and weight of what is in them.
+    """
+
+    positions: NDArray[np.float32]
+    edges: Indices
+    loose_edges: Indices
+    layers: tuple[_Layer, ...]
+    uv_maps: tuple[tuple[str, bool, bool], ...]
+    colours: dict[str, str]
+    groups: tuple[str, ...]
+    members: Array
+
+
+def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
+    """What a mesh carries; `groups` are the names of its vertex groups."""
+    coming = [one for one in source.attributes if one.data_type in LAYOUT and _comes_along(one.name)]
+    edges, loose = _EMPTY, np.ones(len(source.edges), dtype=bool)
+    if len(source.loops):
+        loose[_values(source.attributes[".corner_edge"])] = False  # a hundred times faster than `loops`
+    if loose.any() or any(attribute.domain == "EDGE" for attribute in coming):
+        edges = _values(source.attributes[".edge_verts"]).astype(np.intp)
+    colours: Any = source.color_attributes
+    chosen = {choice: getattr(colours, choice) for choice in ("active_color_index", "render_color_index")}
+    members = [
+        (item.group, vertex.index, item.weight)
+        for vertex in (source.vertices if groups else ())
+        for item in vertex.groups
+    ]
+    return Carried(
+        positions=mesh_arrays.positions(source),
+        edges=edges,
+        loose_edges=edges[loose] if loose.any() else _EMPTY,
+        layers=tuple(_Layer(one.name, one.data_type, one.domain, _values(one)) for one in coming),
+        uv_maps=tuple((layer.name, bool(layer.active), bool(layer.active_render)) for layer in source.uv_layers),
+        colours={choice: colours[index].name for choice, index in chosen.items() if 0 <= index < len(colours)},
+        groups=tuple(groups),
+        members=np.array(members, dtype=np.float64).reshape(-1, 3),
+    )
+
+
+def building(name: ObjectName, carried: Carried, surface: Surface, refinement: Refinement) -> Slices[None]:
+    """Give the empty mesh of an object the kept faces of a source and the new ones, with all that the source carries.
 
     Vertices of the source keep their numbers and their positions, bit for bit.
 
     Parameters
     ----------
-    name : str
-    source : bpy.types.Mesh
+    name : ObjectName
+    carried : Carried
+        Of the source.
     surface : Surface
         Of the source.
     refinement : Refinement
         Of the surface.
-    groups : sequence of str
-        Names of the vertex groups of the source, which only its object knows.
     """
-    mesh = bpy.data.meshes.new(name)
     unrefined = refinement.kept_faces
     size = np.diff(surface.face_start)
     kept_corners = _runs(surface.face_start[unrefined], size[unrefined])
     corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.corner_vertex])
     kept_start = np.cumsum(size[unrefined]) - size[unrefined]
     face_start = np.concatenate([kept_start, len(kept_corners) + refinement.face_start[:-1]])
-
+    yield
+    edges, corner_edge = yield from face_edges.slices(corner_vertex, face_start)
+    edges = np.concatenate([edges, carried.loose_edges.astype(np.int32)])
+    mesh = _mesh_of(name)
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
-    _add_loose_edges(mesh, source)
-    mesh_arrays.add_faces(mesh, corner_vertex, face_start)
-    del corner_vertex, face_start
-    position: Any = mesh.attributes["position"]
-    position.data.foreach_set("vector", refinement.at_vertices(surface, mesh_arrays.positions(source)).ravel())
-    mesh.update(calc_edges=True)
-
-    for material in source.materials:
-        mesh.materials.append(material and material.original)  # an evaluated mesh holds evaluated materials
-    edges = _edge_sources(mesh, source, refinement)
-    for attribute in source.attributes:
-        if attribute.data_type not in LAYOUT or not _comes_along(attribute.name):
-            continue
-        values = _values(attribute)
-        if attribute.domain == "POINT":
+    mesh_arrays.add_faces(mesh, corner_vertex, face_start, edges, corner_edge)
+    del corner_vertex, face_start, corner_edge
+    yield
+    position: Any = _mesh_of(name).attributes["position"]
+    position.data.foreach_set("vector", refinement.at_vertices(surface, carried.positions).ravel())
+    edge_source = _edge_sources(edges, carried, refinement)
+    for layer in carried.layers:
+        yield
+        values = layer.values
+        if layer.domain == "POINT":
             values = refinement.at_vertices(surface, values)
-        elif attribute.domain == "CORNER":
+        elif layer.domain == "CORNER":
             values = refinement.at_corners(surface, values, kept_corners)
-        elif attribute.domain == "FACE":
+        elif layer.domain == "FACE":
             values = values[np.concatenate([unrefined, surface.triangle_face[refinement.source]])]
         else:
-            values = np.where((edges >= 0).reshape(-1, *[1] * (values.ndim - 1)), values[edges], 0).astype(values.dtype)
-        _write(mesh, attribute, values)
-    _copy_choices(mesh, source)
-    if groups:
-        _copy_vertex_groups(mesh, source, surface, refinement, groups)
+            is_known = (edge_source >= 0).reshape(-1, *[1] * (values.ndim - 1))
+            values = np.where(is_known, values[edge_source], 0).astype(values.dtype)
+        _write(_mesh_of(name), layer, values)
+    yield
+    mesh = _mesh_of(name)
+    _copy_choices(mesh, carried)
+    if carried.groups:
+        with none_left_if_it_fails():
+            _copy_vertex_groups(mesh, carried, surface, refinement)
     mesh.update()
-    return mesh
 
 
-def _copy_vertex_groups(
-    mesh: bpy.types.Mesh, source: bpy.types.Mesh, surface: Surface, refinement: Refinement, groups: Sequence[str]
-) -> None:
-    """Give the refined mesh the vertex groups of its source, which Blender reads vertex by vertex only."""
-    members = [(item.group, vertex.index, item.weight) for vertex in source.vertices for item in vertex.groups]
-    of_group, vertex, weight = np.array(members, dtype=np.float64).reshape(-1, 3).T
+def _mesh_of(name: ObjectName) -> bpy.types.Mesh:
+    return cast("bpy.types.Mesh", found(name).data)
+
+
+def _copy_vertex_groups(mesh: bpy.types.Mesh, carried: Carried, surface: Surface, refinement: Refinement) -> None:
+    """Give the refined mesh the vertex groups of its source, which Blender writes vertex by vertex only."""
+    of_group, vertex, weight = carried.members.T
     holder = bpy.data.objects.new("SoftGround Groups", mesh)  # the names are the mesh's, but only objects give them
-    for number, name in enumerate(groups):
+    for number, name in enumerate(carried.groups):
         group = holder.vertex_groups.new(name=name)
         chosen = of_group == number
-        weights = np.zeros(len(source.vertices))
+        weights = np.zeros(len(surface.vertices))
         weights[vertex[chosen].astype(np.intp)] = weight[chosen]
         everywhere = refinement.at_vertices(surface, weights).astype(np.float32)
         inside = np.flatnonzero(everywhere)
@@ -133,27 +206,16 @@ def _comes_along(name: str) -> bool:
     return name == SEAM or not (name.startswith(".") or name in NOT_COPIED or name in own_data.ATTRIBUTES)
 
 
-def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
-    """Edges without a face, which no face would bring back."""
-    used = np.zeros(len(source.edges), dtype=bool)
-    if len(source.loops):
-        used[_values(source.attributes[".corner_edge"])] = True  # a hundred times faster than `loops`
-    loose = np.flatnonzero(~used)
-    if len(loose):
-        mesh.edges.add(len(loose))
-        mesh.edges.foreach_set("vertices", _bulk(source.edges, "vertices", 2)[loose].ravel().astype(np.int32))
-
-
-def _edge_sources(mesh: bpy.types.Mesh, source: bpy.types.Mesh, refinement: Refinement) -> Indices:
-    """The source's edge that each edge of the mesh is, or is a part of, (E,); -1 where it is a new one."""
-    if not any(attribute.domain == "EDGE" and _comes_along(attribute.name) for attribute in source.attributes):
+def _edge_sources(edges: Indices, carried: Carried, refinement: Refinement) -> Indices:
+    """The source's edge that each edge is, or is a part of, (E,); -1 where it is a new one."""
+    if not any(layer.domain == "EDGE" for layer in carried.layers):
         return np.zeros(0, dtype=np.intp)
-    size = len(mesh.vertices)
-    given = _edge_keys(_bulk(source.edges, "vertices", 2), size)
+    size = len(carried.positions) + len(refinement.new_vertex)
+    given = _edge_keys(carried.edges, size)
     whole = _find(given, _edge_keys(refinement.edge_of, size))  # none where it parts the diagonal of a face
     known = np.concatenate([given, _edge_keys(refinement.edges, size)])
     numbers = np.concatenate([np.arange(len(given)), whole])
-    place = _find(known, _edge_keys(_bulk(mesh.edges, "vertices", 2), size))
+    place = _find(known, _edge_keys(edges.astype(np.intp), size))
     return np.where(place >= 0, numbers[place], -1)
 
 
@@ -168,31 +230,22 @@ def _edge_keys(edges: Indices, size: int) -> Indices:
     return np.asarray(edges.min(axis=1) * size + edges.max(axis=1))
 
 
-def _copy_choices(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
+def _copy_choices(mesh: bpy.types.Mesh, carried: Carried) -> None:
     """Which UV map and colours are active and rendered."""
-    for layer in source.uv_layers:
-        copy: Any = mesh.uv_layers.get(layer.name)
+    for name, active, active_render in carried.uv_maps:
+        copy: Any = mesh.uv_layers.get(name)
         if copy is not None:
-            copy.active, copy.active_render = layer.active, layer.active_render
+            copy.active, copy.active_render = active, active_render
     colours: Any = mesh.color_attributes
-    for choice in ("active_color_index", "render_color_index"):
-        index = getattr(source.color_attributes, choice)
-        if 0 <= index < len(source.color_attributes):
-            wanted = source.color_attributes[index].name
-            names = [attribute.name for attribute in colours]
-            if wanted in names:
-                setattr(colours, choice, names.index(wanted))
+    names = [attribute.name for attribute in colours]
+    for choice, wanted in carried.colours.items():
+        if wanted in names:
+            setattr(colours, choice, names.index(wanted))
 
 
 def _runs(start: Indices, count: Indices) -> Indices:
     """For starts (5, 9) and counts (2, 3): 5, 6, 9, 10, 11."""
     return np.repeat(start - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-
-
-def _bulk(collection: Any, name: str, width: int = 1) -> Indices:
-    values = np.empty(len(collection) * width, dtype=np.int32)
-    collection.foreach_get(name, values)
-    return values.astype(np.intp) if width == 1 else values.astype(np.intp).reshape(-1, width)
 
 
 def _values(attribute: Any) -> NDArray[Any]:
@@ -202,8 +255,8 @@ def _values(attribute: Any) -> NDArray[Any]:
     return values if width == 1 else values.reshape(-1, width)
 
 
-def _write(mesh: bpy.types.Mesh, attribute: Any, values: NDArray[Any]) -> None:
-    target: Any = mesh.attributes.get(attribute.name)
-    if target is None or target.domain != attribute.domain or target.data_type != attribute.data_type:
-        target = mesh.attributes.new(attribute.name, attribute.data_type, attribute.domain)
-    target.data.foreach_set(LAYOUT[attribute.data_type][0], np.ascontiguousarray(values).ravel())
+def _write(mesh: bpy.types.Mesh, layer: _Layer, values: NDArray[Any]) -> None:
+    target: Any = mesh.attributes.get(layer.name)
+    if target is None or target.domain != layer.domain or target.data_type != layer.kind:
+        target = mesh.attributes.new(layer.name, cast("Any", layer.kind), cast("Any", layer.domain))
+    target.data.foreach_set(LAYOUT[layer.kind][0], np.ascontiguousarray(values).ravel())

@@ -6,9 +6,7 @@ selected and active in its place.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import ExitStack
 
 import bpy
 import numpy as np
@@ -17,6 +15,9 @@ from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
 from ...core.numerics.cell_keys import Keys, keys_of
+from ...core.numerics.slices import Slices, sliced
+from ...core.settings import ObjectName
+from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import playback
 from ..settings import exists, find, name_of
@@ -52,15 +53,18 @@ def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
     return Region(np.unique(footfalls[:, None] + disc), cell_size)
 
 
-def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:
-    """The faces of the ground as its modifiers leave it, in world space [m]."""
+@sliced
+def surface_of(ground: bpy.types.Object, unit_scale: float) -> Slices[Surface]:
+    """The faces of the ground as its modifiers leave it, in world space [m]; all is read in the first slice."""
     with ground_mesh.undisturbed_copy(ground) as source:
-        return refined_mesh.surface_of(source, ground_mesh.to_world_of(ground, unit_scale))
+        faces, to_world = mesh_arrays.read_faces(source), ground_mesh.to_world_of(ground, unit_scale)
+    yield
+    return (yield from refined_mesh.surface_of.slices(faces, to_world))
 
 
-@contextmanager
-def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Iterator[bpy.types.Object]:
-    """The refined ground as an object that is in no scene yet; one that is not published is taken away at the end.
+@sliced
+def draft(drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Slices[ObjectName]:
+    """The refined ground as an object that is in no scene yet; one that is not published goes as `drafts` close.
 
     Raises
     ------
@@ -73,10 +77,11 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
             "copy that takes the prints: remove them, or Subdivide the ground so that it needs no copy."
         )
     with none_left_if_it_fails():
+        mesh = bpy.data.meshes.new(f"{ground.name} Trail")
         with ground_mesh.undisturbed_copy(ground) as source:
-            groups = [group.name for group in ground.vertex_groups]
-            mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
-        del surface, refinement  # they may be large, and the draft is there for long
+            for material in source.materials:
+                mesh.materials.append(material and material.original)  # an evaluated mesh holds evaluated materials
+            carried = refined_mesh.read(source, [group.name for group in ground.vertex_groups])
         detail = ground.copy()
         detail.name = f"{ground.name} Trail"
         for modifier in [
@@ -88,11 +93,15 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
         for name in (DETAIL, DETAIL_OF):
             detail.pop(name, None)  # of a hidden ground, or of one that is a duplicate of such a copy
         drafted = name_of(detail)
-    try:
-        yield detail
-    finally:
-        if (left := find(drafted)) is not None and DETAIL_OF not in left.keys():  # noqa: SIM118  (an ID is no mapping)
-            ground_mesh.discard(left)
+    drafts.callback(_discard_unpublished, drafted)
+    yield
+    yield from refined_mesh.building(drafted, carried, surface, refinement)
+    return drafted
+
+
+def _discard_unpublished(drafted: ObjectName) -> None:
+    if (left := find(drafted)) is not None and DETAIL_OF not in left.keys():  # noqa: SIM118  (an ID is no mapping)
+        ground_mesh.discard(left)
 
 
 def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:

@@ -1,6 +1,6 @@
 """Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed, and as sliders are moved.
 
-No modal operator is needed for it: a handler follows the frame, and a timer the settings once the panel is drawn or
+While it is on no operator is at work: a handler follows the frame, and a timer the settings once the panel is drawn or
 something is edited, so that autosave, undo and every other tool go on working, and nothing runs where nothing changes.
 While live mode is on, the ground carries the prints that a bake would make.
 """
@@ -11,16 +11,11 @@ import time
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty
 
 from ...core.errors import InputError
 from .. import session, settings
-from ..characters.character_setup import characters_of
-from ..ground import baked_ground
-from ..operator_base import reports_errors
-from ..reading import analysis
 from ..state import state
-from .live_mode import Contact, LiveMode
+from .live_mode import PART, Contact, LiveMode
 
 LOOK = 0.1
 """Time between two looks at the settings [s]."""
@@ -28,8 +23,6 @@ SOON = 0.05
 """Time from a possible change to the first look [s]."""
 PAUSE = 0.005
 """Time for everything else between two parts of an answer [s]."""
-PART = 0.025
-"""Processor time of a part of an answer, beside the frame that is being pressed when it ends [s]."""
 LONGEST_PART = 0.05
 """Largest processor time of a part, if drawing between two parts takes as long [s]."""
 
@@ -112,6 +105,16 @@ def refusal() -> str:
     return state.live.refusal(settings.snapshot(scene))
 
 
+def begin(mode: LiveMode) -> None:
+    """Follow timeline and settings from now on."""
+    state.live = mode
+    session.current().is_live = True
+    bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
+    if scene := mode.current_scene():
+        mode.follow(scene)  # the frame may have changed meanwhile
+    watch()
+
+
 def forget() -> None:
     """End live mode as it stands, because its scene or its ground went away."""
     state.live = None
@@ -136,72 +139,3 @@ def discard() -> None:
 
 def _scene() -> bpy.types.Scene | None:
     return state.live.current_scene() if state.live else None
-
-
-class SOFTGROUND_OT_live(bpy.types.Operator):
-    """Let the ground give way while the timeline plays, or end live mode"""
-
-    bl_idname = "softground.live"
-    bl_label = "Live Footprints"
-    bl_options = {"REGISTER", "UNDO"}
-
-    keep: BoolProperty(
-        name="Keep",
-        description="When live mode ends, keep the prints as a bake instead of removing them",
-        default=False,
-        options={"SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if live mode can start or end; otherwise the button says what is missing."""
-        if is_on():
-            return True
-        reason = _why_not(context)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
-        """Effect of the button at the moment."""
-        if not is_on():
-            return "Press prints while the timeline plays. Move a slider, and the prints follow"
-        if properties.keep:
-            return "End live mode and leave the prints on the ground, as a bake up to the current frame"
-        return "End live mode and leave the ground as it was before"
-
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = _scene() or settings.scene_of(context)
-        if state.live is None:
-            state.live = LiveMode(scene)
-            session.current().is_live = True
-            bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
-            state.live.follow(scene)
-            watch()
-        elif self.keep:
-            with analysis.own_changes(scene):
-                state.live.keep(scene)
-            forget()
-        else:
-            discard()
-        session.redraw()
-        return {"FINISHED"}
-
-
-def _why_not(context: bpy.types.Context) -> str:
-    """Reason why live mode cannot start, or an empty text."""
-    options = settings.options_of(context)
-    if session.current().is_baking:
-        return "A bake is running"
-    if session.is_rendering():
-        return "A render is running: wait until it has ended"
-    if not characters_of(settings.options_of(context)):
-        return "Add a character first: select its armature and press Add Character"
-    if options.ground and baked_ground.is_baked(options.ground):
-        return "There is a bake on the ground: clear it first"
-    return ""
-
-
-CLASSES = (SOFTGROUND_OT_live,)

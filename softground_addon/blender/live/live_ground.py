@@ -15,12 +15,13 @@ from ...core.ground.display_blur import blurred_window, gaussian_kernel
 from ...core.ground.heightfield import HeightField
 from ...core.ground.sparse_grid import TILE, Window
 from ...core.numerics import bilinear
+from ...core.numerics.slices import Slices
 from ...core.record import record
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
 from .. import settings
 from ..ground import ground_mesh
-from ..reading.shots import Shot
+from ..ground.baked_ground import Place
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -70,32 +71,31 @@ class LiveGround:
 
     Parameters
     ----------
-    ground : bpy.types.Object
-        Carries no bake.
-    vertices : (V, 3) float array
-        World positions of its vertices [m].
-    shot : Shot
-        Read from that ground, or from the one that it stands in for.
+    place : Place
+        Its display mesh carries no bake.
     unit_scale : float
         Metres per Blender unit.
     """
 
-    def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
-        self._name = settings.name_of(ground)
-        x, y, z = vertices.T
-        near = ((vertices[:, :2] >= shot.lower) & (vertices[:, :2] <= shot.upper)).all(axis=1)
-        near = np.flatnonzero(near)
-        on_top = np.abs(z[near] - shot.terrain.heights(x[near], y[near])) < ground_mesh.ON_SURFACE
-        self._vertices = near[on_top]
-        self._place = vertices[self._vertices, :2]
+    def __init__(self, place: Place, unit_scale: float) -> None:
+        ground = settings.found(place.display_mesh)
+        self._name = place.display_mesh
+        self._vertices, self._place = place.index, place.position[:, :2]
         self._up = ground_mesh.up_of(ground, unit_scale)
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
-        nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
-        # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        ground_mesh.write(ground, np.empty(0, np.intp), nothing, no_prints, unit_scale, shape_keys=False)
         self.take_from(ground)
+
+    def put_on(self, place: Place, unit_scale: float) -> bpy.types.Object:
+        """Show a place that has no prints yet; returns the ground."""
+        nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
+        empty, ground = np.empty(0, np.intp), settings.found(place.display_mesh)
+        # No shape keys: Blender would evaluate them on the whole mesh at each frame.
+        ground_mesh.write(ground, empty, nothing, no_prints, unit_scale, shape_keys=False)
+        shown = place.publish()
+        self._name = settings.name_of(shown)
+        return shown
 
     def take_from(self, ground: bpy.types.Object) -> None:
         """Start from the mesh as it is now; it is written as a whole when it is shown next."""
@@ -138,18 +138,10 @@ class LiveGround:
         frame_rate : float
             Scene frames per second [Hz].
         """
-        field = playhead.ground
-        margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
-        tiles = _tiles_of(windows, margin)
-        for tile in tiles:
-            vertices = self._vertices_of(tile, field.cell_size)
-            if len(vertices.index):
-                window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE)
-                self._update(field, window, vertices, sigma)
-                column, row = vertices.cell.T
-                self._contact[vertices.index] = playhead.contact.read(window)[0, row, column]
+        for _ in self.updating(playhead, windows, sigma):
+            pass
         mesh = ground_mesh.mesh_of(ground)
-        if tiles or not self._is_written:
+        if not self._is_written:
             for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
                 _write(mesh, name, values)
             ground_mesh.write_positions(mesh, self._display)
@@ -157,6 +149,20 @@ class LiveGround:
         since = (playhead.frame - self._contact[self._reached]) / frame_rate
         self._age[self._reached] = np.where(np.isfinite(since), since, NEVER)
         _write(mesh, ground_mesh.AGE, self._age)
+
+    def updating(self, playhead: Playhead, windows: Sequence[Window], sigma: float) -> Slices[None]:
+        """Work out what `show` writes in some windows; the mesh stays as it is."""
+        field = playhead.ground
+        margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
+        for tile in _tiles_of(windows, margin):
+            self._is_written = False
+            vertices = self._vertices_of(tile, field.cell_size)
+            if len(vertices.index):
+                window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE)
+                self._update(field, window, vertices, sigma)
+                column, row = vertices.cell.T
+                self._contact[vertices.index] = playhead.contact.read(window)[0, row, column]
+            yield
 
     def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
         """The vertices over a tile, looked up once."""

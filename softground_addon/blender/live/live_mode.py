@@ -16,32 +16,28 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.composers.ground_plan import plan_ground
-from ...core.composers.playhead import Playhead
+from ...core.composers.playhead import Playhead, footprints_of
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.errors import InputError
 from ...core.ground.sparse_grid import Window
 from ...core.loads.cell_limits import check_cell_size
-from ...core.meshing.refinement import refine
-from ...core.motion.motion import shortest_sole
-from ...core.numerics.cell_keys import cells_at, keys_at
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report
-from ..baking.bake_checks import coverage, wants_detail
 from ..baking.publish import at_the_end, publish, sign, with_debris
-from ..ground import baked_ground, ground_mesh, trail_detail
-from ..ground.created_ground import create_ground, laid_out, reach_of
-from ..ground.modified_prints import are_undone
+from ..ground import baked_ground, ground_mesh
 from ..reading import analysis, staleness
-from ..reading.shots import ground_of, settings_of
+from ..reading.shots import ground_of
 from .live_ground import LiveGround
 
 Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
 """Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
 around them [m]."""
+
+PART = 0.025
+"""Processor time of a part of an answer, beside the frame that is being pressed when it ends [s]."""
 
 
 class LiveMode:
@@ -50,24 +46,23 @@ class LiveMode:
     Parameters
     ----------
     scene : bpy.types.Scene
-
-    Raises
-    ------
-    InputError
-        If the scene could not be baked either.
+    wanted : BakeSettings
+        With its ground.
+    known : analysis.Analysis
+        Of its shot.
+    ground : LiveGround
+        Shows `playhead`.
+    playhead : Playhead
     """
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
-        wanted = settings_of(scene)
-        known = analysis.read(scene)
-        check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
-        if wanted.ground is None:
-            assert known.shot.plan is not None
-            layout = jobs.run(jobs.meanwhile(jobs.Progress("write", 0.0), laid_out(wanted, known.shot.plan)))
-            with analysis.own_changes(scene):
-                ground = create_ground(scene, wanted, layout)
-            wanted = replace(wanted, ground=settings.name_of(ground))
-            known = analysis.read(scene)
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        wanted: BakeSettings,
+        known: analysis.Analysis,
+        ground: LiveGround,
+        playhead: Playhead,
+    ) -> None:
         assert wanted.ground is not None
         self.scene = scene.session_uid
         self.rendering = False
@@ -77,10 +72,8 @@ class LiveMode:
         self._asked: BakeSettings | None = None
         self._can_start_over = True
         self._drawn_over: list[Window] = []
-        self._owner = wanted.ground
-        self._ground = _display_mesh(wanted, known)
-        self._analysis, self._wanted = known, wanted
-        self._playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
+        self._owner, self._ground = wanted.ground, ground
+        self._analysis, self._wanted, self._playhead = known, wanted, playhead
 
     def follow(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
@@ -246,34 +239,43 @@ class LiveMode:
         """See `in_contact` of this module."""
         return self._playhead.in_contact(), self._playhead.ground.cell_size, self._wanted.material.rim_reach
 
-    def keep(self, scene: bpy.types.Scene) -> None:
+    def keeping(self, scene: bpy.types.Scene) -> jobs.Job[None]:
         """Keep the ground as shown: as the bake of the frames up to now, with the settings that pressed them."""
+        now = jobs.Progress("simulate", 0.0)
+        with suppress(InputError):  # then the last ground is kept
+            if self.has_more(scene):
+                yield from analysis.reading(scene)
+            while self.answer(scene, PART):
+                yield now
         ground = self._object(scene)
         if ground is None:
             return
-        with suppress(InputError):  # then the last ground is kept
-            self.answer(scene)
-        now = settings.snapshot(scene)
+        playhead, loads, shot = self._playhead, self._playhead.loads_by_now(), self._analysis.shot
+        asked = settings.snapshot(scene)
         made_with = replace(
             self._wanted,
-            frames=(self._wanted.frames[0], int(self._playhead.frame)),
-            shape_keys=now.shape_keys,
-            dense_shape_keys=now.dense_shape_keys,
-            tread_m=now.tread_m,
-            debris=now.debris,
+            frames=(self._wanted.frames[0], int(playhead.frame)),
+            shape_keys=asked.shape_keys,
+            dense_shape_keys=asked.dense_shape_keys,
+            tread_m=asked.tread_m,
+            debris=asked.debris,
             weather=None,  # which live mode does not follow
         )
         with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
-            made_with = with_shoe_treads(made_with, self._analysis.shot.motions)
-        footprints = self._playhead.footprints()
-        vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
-        shown = PressedGround.at(footprints, **at_the_end(made_with))
-        place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
+            made_with = with_shoe_treads(made_with, shot.motions)
+        movers, name = staleness.of_movers(scene, made_with), settings.name_of(ground)
+        footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
+        yield now
+        vertices = ground_mesh.rest_vertices(settings.found(name), made_with.unit_scale_m)
+        pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
+        shown = yield from jobs.meanwhile(now, pressing)
+        looking = ground_mesh.pressed_vertices.slices(vertices, shown.covers, shot.terrain)
+        index = yield from jobs.meanwhile(now, looking)
+        place = baked_ground.on_itself(settings.found(name), index, vertices)
         baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
-        pressed_on = ground_of(made_with, self._analysis.shot)
-        baked, debris = with_debris(baked, pressed_on, made_with, self._playhead.loads_by_now())
-        published = jobs.run(publish(baked, debris, place, made_with))
-        movers = staleness.of_movers(scene, made_with)
+        throwing = with_debris.slices(baked, ground_of(made_with, shot), made_with, loads)
+        baked, debris = yield from jobs.meanwhile(now, throwing)
+        published = yield from publish(baked, debris, place, made_with)
         sign(published, made_with, movers, summary=bake_report.summary_of_prints(baked.footprints))
 
     def discard(self) -> None:
@@ -281,35 +283,6 @@ class LiveMode:
         ground = settings.find(self._owner) or self._ground.object(None)
         if ground is not None:
             baked_ground.clear(ground)
-
-
-def _display_mesh(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
-    """The ground that takes the prints, or a copy of it that is fine where its characters will step.
-
-    Raises
-    ------
-    InputError
-        If the ground is too coarse and is to stay so.
-    """
-    assert wanted.ground is not None
-    ground, shot = settings.found(wanted.ground), known.shot
-    unit_scale, cell_size, detail = wanted.unit_scale_m, wanted.cell_size_m, wanted.detail
-    vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
-    plan = shot.plan or plan_ground(shot.motions)
-    if plan.footfalls is not None:
-        footfalls = cells_at(plan.footfalls, cell_size)
-        cover = coverage(vertices, slice(None), footfalls, cell_size)
-        under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
-        if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
-            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
-        ):
-            surface = trail_detail.surface_of(ground, unit_scale)
-            region = trail_detail.region_around(footfalls, cell_size, reach_of(wanted.material))
-            refinement = refine(surface, region, cell_size)
-            with trail_detail.draft(ground, surface, refinement) as draft:
-                ground = trail_detail.publish(ground, draft)
-            vertices = refinement.at_vertices(surface, surface.vertices)
-    return LiveGround(ground, vertices, shot, unit_scale)
 
 
 _ENDED = object()

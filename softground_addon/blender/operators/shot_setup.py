@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import bpy
@@ -18,8 +18,7 @@ from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, recognition, selection
 from ..command_line import program
-from ..ground import baked_ground, ground_checks, ground_mesh, look
-from ..ground.created_ground import create_ground, laid_out, select
+from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look
 from ..operator_base import reports_errors
 from ..reading import analysis, shots
 from ..response import response_job
@@ -172,10 +171,13 @@ class SOFTGROUND_OT_create_ground(Reading):
 def _created(scene: bpy.types.Scene) -> jobs.Job[Reports]:
     wanted = shots.settings_of(scene)
     plan = yield from shots.fit_ground(scene, wanted)
-    layout = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), laid_out(wanted, plan))
-    with analysis.own_changes(scene):
-        ground = create_ground(scene, wanted, layout)
-    select(scene, ground)
+    with ExitStack() as drafts:
+        creating = created_ground.created(drafts, wanted, plan)
+        name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
+        ground = settings.found(name)
+        with analysis.own_changes(scene):
+            created_ground.publish(scene, ground, wanted.surface)
+    created_ground.select(scene, ground)
     text = f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices"
     return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
 

@@ -20,7 +20,7 @@ from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
-from .. import settings
+from .. import mesh_arrays, settings
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, refined_mesh
 from ..weather import weathered_points
@@ -183,7 +183,8 @@ def _pixels(
         if layer is None:
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
-        surface = refined_mesh.surface_of(mesh, ground_mesh.to_world_of(ground, scene.unit_settings.scale_length))
+        to_world = ground_mesh.to_world_of(ground, scene.unit_settings.scale_length)
+        surface = refined_mesh.surface_of(mesh_arrays.read_faces(mesh), to_world)
         name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)
     corner = surface.vertices[surface.corner_vertex[surface.triangle_corners]]

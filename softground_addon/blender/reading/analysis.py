@@ -142,7 +142,7 @@ def read(scene: bpy.types.Scene) -> Analysis:
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     """What `read` does, in steps."""
-    analysis = current(scene)
+    analysis = yield from refreshing(scene)
     if analysis is None:
         wanted = settings_of(scene)
         shot = yield from read_shot(scene, replace(wanted, response=None))

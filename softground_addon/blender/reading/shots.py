@@ -141,8 +141,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
-    surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
-    yield Progress("sample", 1.0)
+    looking = ground_mesh.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted)
+    surface = yield from meanwhile(Progress("sample", 1.0), looking)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])

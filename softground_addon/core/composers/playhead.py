@@ -13,6 +13,7 @@ from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
 from ..loads.estimate import CharacterLoads
 from ..numerics.intervals import runs
+from ..numerics.slices import Slices, sliced
 from ..pressing.ground_cells import UndisturbedCells
 from ..record.footprints import Footprint
 from .simulation import FrameResult, Simulation
@@ -85,7 +86,7 @@ class Playhead:
         self.ground = pressed.copy() if pressed else HeightField(cell_size)
         self.contact = SparseGrid(cell_size, channels=1, fill=-np.inf)
         self._loads, self._soft_ground, self._before = tuple(loads), ground, self.ground.copy()
-        self._results = self._press(self._loads)
+        self._results = self.press(self._loads)
         self._changes = [_Change(next(self._results).frame)]
         self._shown = 0
 
@@ -167,11 +168,6 @@ class Playhead:
         """What has pressed the ground that is shown."""
         return [_until(self.frame, character) for character in self._loads]
 
-    def footprints(self) -> list[Footprint]:
-        """The record of the ground that is shown, with the contacts that are under way as they are by now."""
-        footprints = [footprint for result in self._press(self.loads_by_now()) for footprint in result.footprints]
-        return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
-
     def _taken_over(self, result: FrameResult) -> _Change:
         """Bring the ground that is shown to the frame that was just pressed."""
         before, after = [], []
@@ -190,8 +186,20 @@ class Playhead:
             self.contact.write(window, np.where(cells, frame, earlier[-1]))
         return tuple(earlier)
 
-    def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
+    def press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
+        """What loads do to the ground as it was before, frame by frame."""
         return Simulation(self._soft_ground, self._before.copy(), self.undisturbed).run(loads)
+
+
+@sliced
+def footprints_of(playhead: Playhead, loads: Sequence[CharacterLoads]) -> Slices[list[Footprint]]:
+    """The record of the ground that a playhead shows after its `loads_by_now`, with the contacts that are under way as
+    they are by then."""
+    footprints: list[Footprint] = []
+    for result in playhead.press(loads):
+        footprints += result.footprints
+        yield
+    return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
 
 
 def _until(frame: float, character: CharacterLoads) -> CharacterLoads:

@@ -166,7 +166,8 @@ def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinemen
         belong to all faces at the edge.
     """
     triangle_vertices = surface.triangle_vertices
-    at_work = _faces_at(surface, triangle_vertices, region, COARSEST_LEG * spacing)
+    at_work = yield from _faces_at(surface, triangle_vertices, region, COARSEST_LEG * spacing)
+    yield
     parts, grain = _equal_parts(surface, triangle_vertices[at_work[surface.triangle_face]], spacing)
     if parts > 1:
         at_work[:] = True
@@ -193,15 +194,18 @@ def _equal_parts(surface: Surface, wanted: Indices, spacing: float) -> tuple[int
     return int(counts[best]), max(FINEST_GRAIN, 2.0 ** (np.ceil(halvings[best] / 2) - WEIGHT_BITS))
 
 
-def _faces_at(surface: Surface, triangle_vertices: Indices, region: Region, leg: float) -> Mask:
+def _faces_at(surface: Surface, triangle_vertices: Indices, region: Region, leg: float) -> Slices[Mask]:
     """Faces that are too large and reach into the region, with all faces that share a vertex with them."""
     place = surface.vertices[:, :2]
-    corners = [place[corner] for corner in triangle_vertices.T]
-    low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
-    wanted = region.touches(low, high)
-    wanted[wanted] = longest_sides(surface.vertices, triangle_vertices[wanted]) > leg * np.sqrt(2)
     touched = np.zeros(len(place), dtype=bool)
-    touched[triangle_vertices[wanted]] = True
+    for begin in range(0, len(triangle_vertices), AT_ONCE):
+        yield
+        triangles = triangle_vertices[begin : begin + AT_ONCE]
+        corners = [place[corner] for corner in triangles.T]
+        low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
+        near = triangles[region.touches(low, high)]
+        touched[near[longest_sides(surface.vertices, near) > leg * np.sqrt(2)]] = True
+    yield
     return np.logical_or.reduceat(touched[surface.corner_vertex], surface.face_start[:-1])
 
 

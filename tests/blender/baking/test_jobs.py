@@ -1,14 +1,19 @@
 """Jobs compute in slices, so that Blender answers between them."""
 
 import time
+from contextlib import ExitStack
 
 import bpy
 import numpy as np
 import pytest
 
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import created_ground
+from softground_addon.blender.ground import baked_ground, created_ground
 from softground_addon.blender.jobs import Progress, meanwhile, run
+from softground_addon.blender.live import live, live_start
+from softground_addon.blender.operators import live_footprints
+from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
 from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.numerics.slices import sliced
@@ -17,6 +22,9 @@ from tests.tiers import slow_but_one
 
 LONGEST_STEP = 0.1
 """Longest time that a step of a bake may take of the processor [s]."""
+
+LONGEST_IN_A_WINDOW = 0.3
+"""Longest time that any step may take, on a ground of any size [s]."""
 
 NOW = Progress("write", 0.5)
 
@@ -76,6 +84,43 @@ def test_a_large_ground_is_laid_out_in_short_steps():
     close_up = created_ground.CloseUp(0.0025, np.ones(len(along), dtype=bool), 10**7)
     steps = steps_of(created_ground.lay_out.slices(plan, 0.01, 1.0, reach=0.1, close_up=close_up))
     assert share_of_longest(steps) < 0.3, steps[:5]
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_the_mesh_of_a_large_created_ground_is_made_in_short_steps(scene):
+    plan = GroundPlan(np.full(2, -7.0), np.full(2, 7.0), FlatTerrain())
+    layout = created_ground.lay_out(plan, 0.01, 1.0)
+    assert len(layout.vertices) > 1_900_000
+    with ExitStack() as drafts:
+        steps = steps_of(meanwhile(NOW, created_ground.draft.slices(drafts, layout, 0.5)))
+    assert steps[0][0] < LONGEST_IN_A_WINDOW, steps[:5]
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_no_step_of_live_mode_on_two_million_vertices_takes_long(scene):
+    """The ground is coarse, and gets a copy along the trail."""
+    walker(scene, frames=250, coarseness=1.0)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1414, y_subdivisions=1414, size=200.0)
+    scene.softground.ground = bpy.context.object
+    bpy.context.view_layer.update()
+    scene.frame_set(200)
+    for keep in (False, True):
+        steps = steps_of(live_job(scene, keep=keep))
+        assert steps[0][0] < LONGEST_IN_A_WINDOW, steps[:5]
+    assert not live.is_on()
+    assert "softground_record" in baked_ground.display_mesh_of(scene.softground.ground).data
+
+
+def live_job(scene, *, keep):
+    """What the button does that starts live mode, or ends it."""
+    if not keep:
+        live.begin((yield from live_start.starting(scene)))
+    else:
+        with analysis.own_changes(scene):
+            yield from live_footprints._ended(state.live, scene, keep=True)
 
 
 def create_plane():

@@ -1,5 +1,7 @@
 """The ground as a mesh: read, pressed, and given back bit for bit."""
 
+from contextlib import ExitStack
+
 import bpy
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from softground_addon.blender import compat
 from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh, still_ground
 from softground_addon.blender.playback import display_key
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
+from softground_addon.blender.settings import found
 from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
@@ -20,7 +23,8 @@ from tests.tiers import slow_but_one
 def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
     half = np.array([size, size]) / 2
     plan = GroundPlan(-half, half, FlatTerrain(height))
-    with created_ground.draft(created_ground.lay_out(plan, spacing, unit_scale)) as ground:
+    with ExitStack() as drafts:
+        ground = found(created_ground.draft(drafts, created_ground.lay_out(plan, spacing, unit_scale)))
         scene.collection.objects.link(ground)
     bpy.context.view_layer.update()
     return ground

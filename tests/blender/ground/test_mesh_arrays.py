@@ -60,8 +60,9 @@ def as_blender_says(mesh):
 )
 def test_triangles_are_blender_s_own(scene, kinds):
     mesh = mesh_of(kinds)
-    corners, face = mesh_arrays.triangle_corners(mesh)
-    assert (list(map(tuple, corners.tolist())), face.tolist()) == as_blender_says(mesh)
+    faces = mesh_arrays.read_faces(mesh)
+    corners = mesh_arrays.triangle_corners(faces)
+    assert (list(map(tuple, corners.tolist())), faces.triangle_face.tolist()) == as_blender_says(mesh)
     vertices = np.array([tuple(one.vertices) for one in mesh.loop_triangles])
     assert (mesh_arrays.triangles(mesh) == vertices).all()
 

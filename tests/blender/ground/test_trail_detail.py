@@ -1,10 +1,13 @@
 """A fine copy of a coarse ground along the trail: what it carries, and that the original comes back."""
 
+from contextlib import ExitStack
+
 import bpy
 import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
+from softground_addon.blender.settings import found
 from softground_addon.core.meshing.refinement import refine
 from softground_addon.core.meshing.region import Region
 from softground_addon.core.numerics.cell_keys import keys_of
@@ -70,8 +73,9 @@ def dress(ground):
 
 def refined(ground, spacing=0.02, where=None):
     surface = trail_detail.surface_of(ground, 1.0)
-    with trail_detail.draft(ground, surface, refine(surface, where or region(), spacing)) as draft:
-        return trail_detail.publish(ground, draft)
+    with ExitStack() as drafts:
+        draft = trail_detail.draft(drafts, ground, surface, refine(surface, where or region(), spacing))
+        return trail_detail.publish(ground, found(draft))
 
 
 def triangles_of(mesh):

@@ -1,5 +1,6 @@
 """Live mode: what the timeline shows, whatever way the playhead takes, and nothing left behind."""
 
+from itertools import islice
 from unittest.mock import MagicMock
 
 import bpy
@@ -9,9 +10,11 @@ import pytest
 from softground_addon.blender import handlers
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.debris import debris_object
-from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.live import live
+from softground_addon.blender.ground import baked_ground, created_ground, ground_mesh
+from softground_addon.blender.live import live, live_start
 from softground_addon.blender.playback import own_data
+from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 from tests.tiers import slow_but_one
@@ -508,3 +511,50 @@ def test_live_mode_waits_until_a_bake_is_cleared(shot):
     assert not bpy.ops.softground.live.poll()
     bpy.ops.softground.clear_bake()
     assert bpy.ops.softground.live.poll()
+
+
+def steps_taken(job, most=10**6):
+    """Steps of a job that is left after some of them, as Esc does, unless it ends before."""
+    taken = sum(1 for _ in islice(job, most))
+    job.close()
+    return taken
+
+
+@pytest.mark.parametrize("ground", slow_but_one(["coarse", "none", "fine"]))
+def test_esc_as_live_mode_starts_leaves_everything_as_it_was(coarse_shot, ground):
+    if ground == "none":
+        bpy.data.objects.remove(coarse_shot.softground.ground)
+    elif ground == "fine":
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=4.0)
+        coarse_shot.softground.ground = bpy.context.object
+    coarse_shot.frame_set(30)
+    before = fingerprints.of_file()
+    steps = steps_taken(live_start.starting(coarse_shot))
+    baked_ground.clear(coarse_shot.softground.ground)
+    if ground == "none":
+        bpy.ops.object.select_all(action="DESELECT")
+        created_ground.discard(coarse_shot.softground.ground)
+    bpy.context.view_layer.update()
+    assert fingerprints.of_file()["objects"].keys() == before["objects"].keys()
+    before = fingerprints.of_file()
+    assert steps > 50
+    for share in (0.2, 0.5, 0.8, 1.0):
+        analysis.forget()
+        asked = int(share * (steps - 1))
+        assert steps_taken(live_start.starting(coarse_shot), asked) == asked
+        assert fingerprints.of_file() == before
+        assert not live.is_on()
+
+
+def test_esc_as_prints_are_kept_leaves_live_mode_on(coarse_shot):
+    bpy.ops.softground.live()
+    coarse_shot.frame_set(30)
+    shown, before = display_heights(coarse_shot), fingerprints.of_file()
+    for most in (1, 40, 80, 120):
+        assert steps_taken(state.live.keeping(coarse_shot), most) == most
+        assert fingerprints.of_file() == before
+    coarse_shot.frame_set(48)
+    assert live.is_on()
+    assert (display_heights(coarse_shot) != shown).any()
+    bpy.ops.softground.live(keep=True)
+    assert not live.is_on()

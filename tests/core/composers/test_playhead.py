@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.playhead import Playhead
+from softground_addon.core.composers.playhead import Playhead, footprints_of
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
@@ -77,7 +77,7 @@ def test_the_newest_steps_are_pressed_anew_onto_what_lies_there(loads):
     assert newest.frame == playhead.frame
     soft = Playhead([loads], SoftGround(FlatTerrain(), SOFT), CELL)
     soft.go_to(playhead.frame)
-    for footprint in soft.footprints():
+    for footprint in footprints_of(soft, soft.loads_by_now()):
         x, y = footprint.position[:2]
         depths = [one.ground.nearest(x, y)[0] for one in (newest, soft, playhead)]
         if footprint.start_frame > since:
@@ -103,7 +103,7 @@ def test_the_ground_differs_from_an_earlier_frame_only_where_it_is_said_to(loads
 def test_newest_steps_begin_where_the_last_two_feet_came_down(loads):
     playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     playhead.go_to(80.0)
-    starts = sorted(footprint.start_frame for footprint in playhead.footprints())
+    starts = sorted(footprint.start_frame for footprint in footprints_of(playhead, playhead.loads_by_now()))
     assert playhead.before_newest() == pytest.approx(starts[-2] - 1, abs=1.0)
     playhead.go_to(playhead.first_frame)
     assert playhead.before_newest() == playhead.first_frame
@@ -113,6 +113,6 @@ def test_its_footprints_put_together_are_the_ground_that_it_shows(loads):
     playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     for frame in (35.0, 90.0, 50.0):
         playhead.go_to(frame)
-        ground = recompose(playhead.footprints(), cell_size=CELL)
+        ground = recompose(footprints_of(playhead, playhead.loads_by_now()), cell_size=CELL)
         for place, tile in playhead.ground.tiles.items():
             assert ground.tiles.get(place, np.zeros_like(tile)) == pytest.approx(tile, abs=2e-9)

@@ -10,7 +10,7 @@ from mathutils import Euler
 
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
-from tests.gui.stories.live_answers import answering, heights, on_new_ground, scene
+from tests.gui.stories.live_answers import answering, heights, on_new_ground, press_live, scene
 
 FRAMES, FIRST, LAST = 100, 8, 84
 """Of the walk, and of it what is shown."""
@@ -25,7 +25,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield 0.5
     yield from on_new_ground(hand)
     yield 0.5
-    yield from hand.press_button("softground.live")
+    yield from press_live(hand)
     field = yield from hand.find_field("depth_cm", BEGUN)
     set_the_view(hand)  # which is slow to draw, so that nothing is looked for in it
     scene().frame_set(FIRST)

@@ -18,7 +18,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from on_new_ground(hand)
     yield 0.5
     yield from hand.look_at_walk()
-    yield from hand.press_button("softground.live")
+    yield from press_live(hand)
     scene().frame_set(FRAME)
     yield 1.0
     before, age = heights(), ages()
@@ -44,7 +44,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     facts["after"] = [float(heights()[newest].min()), float(heights()[oldest].min())]
     yield from hand.picture("live_answers", in_docs=False)
 
-    yield from hand.press_button("softground.live", offset=0.75)
+    yield from press_live(hand, offset=0.75)
     yield 3.0
     ground = scene().softground.ground
     facts["kept"] = "softground_record" in ground.data
@@ -65,6 +65,13 @@ def on_new_ground(hand: Hand) -> Steps:
     yield 0.2
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield from hand.press_button("softground.create_ground", offset=0.25)
+    yield 0.2
+    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
+
+
+def press_live(hand: Hand, offset: float = 0.5) -> Steps:
+    """Start or end live mode in the panel, and wait for it."""
+    yield from hand.press_button("softground.live", offset=offset)
     yield 0.2
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
 

@@ -9,7 +9,7 @@ from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
 from tests.gui.stories.interrupted_bake import with_viewport
-from tests.gui.stories.live_answers import on_new_ground
+from tests.gui.stories.live_answers import on_new_ground, press_live
 
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
@@ -31,7 +31,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     bpy.ops.softground.load_preset(name="Snow")
     yield 0.3
 
-    yield from hand.press_button("softground.live")
+    yield from press_live(hand)
     facts["live"] = bpy.context.window_manager.softground.is_live
     before = heights()
     yield from hand.move(*hand.middle())
@@ -63,7 +63,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.picture("live")
     scene().frame_set(96)
     yield 0.5
-    yield from hand.press_button("softground.live", offset=0.75)
+    yield from press_live(hand, offset=0.75)
     facts["kept"] = "softground_record" in scene().softground.ground.data
     facts["no longer live"] = not bpy.context.window_manager.softground.is_live
     scene().frame_set(59)
@@ -76,15 +76,15 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["cleared: as before"] = bool((heights() == before).all())
 
     saved = fingerprints.of_file()
-    yield from hand.press_button("softground.live")
+    yield from press_live(hand)
     scene().frame_set(80)
     yield 0.3
-    yield from hand.press_button("softground.live", offset=0.3)
+    yield from press_live(hand, offset=0.3)
     scene().frame_set(59)
     yield 0.3
     facts["discarded: as before"] = fingerprints.of_file() == saved
 
-    yield from hand.press_button("softground.live")
+    yield from press_live(hand)
     path = str(hand.pictures / "live.blend")
     scene().frame_set(80)
     with bpy.context.temp_override(window=hand.window):

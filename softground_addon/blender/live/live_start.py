@@ -1,0 +1,114 @@
+"""The beginning of live mode: the shot is read, and a ground made ready for it, before anything is changed."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.composers.ground_plan import plan_ground
+from ...core.composers.playhead import Playhead
+from ...core.loads.cell_limits import check_cell_size
+from ...core.meshing.refinement import refine
+from ...core.motion.motion import shortest_sole
+from ...core.numerics.cell_keys import among, cells_at, keys_at
+from ...core.settings import BakeSettings
+from .. import settings
+from ..baking.bake_checks import coverage, wants_detail
+from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground.modified_prints import are_undone
+from ..jobs import Job, Progress, meanwhile
+from ..reading import analysis
+from ..reading.shots import Shot, ground_of, settings_of
+from .live_ground import LiveGround
+from .live_mode import LiveMode
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
+
+
+def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
+    """A scene whose ground follows its timeline from now on. Nothing that the user sees changes before the last step.
+
+    Raises
+    ------
+    InputError
+        If the scene could not be baked either.
+    """
+    wanted = settings_of(scene)
+    known = yield from analysis.reading(scene)
+    check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
+    playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        place = yield from _place(drafts, scene, wanted, known.shot)
+        yield PRESSING
+        ground = LiveGround(place, wanted.unit_scale_m)
+        frame = float(scene.frame_current)
+        while playhead.advance(frame):
+            yield PRESSING
+        sigma, windows = wanted.material.blur_sigma, playhead.ground.tile_windows()
+        yield from meanwhile(PRESSING, ground.updating(playhead, windows, sigma))
+        yield PRESSING
+        with analysis.own_changes(scene):
+            shown = ground.put_on(place, wanted.unit_scale_m)
+            ground.show(shown, playhead, (), sigma, wanted.frame_rate)
+    if wanted.ground is None:
+        wanted, known = replace(wanted, ground=settings.name_of(shown)), analysis.read(scene)
+    return LiveMode(scene, wanted, known, ground, playhead)
+
+
+def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> Job[baked_ground.Place]:
+    """The ground that takes the prints, a new one, or a copy that is fine where the characters will step.
+
+    Raises
+    ------
+    InputError
+        If the ground is too coarse and is to stay so.
+    """
+    cell_size, unit_scale, detail = wanted.cell_size_m, wanted.unit_scale_m, wanted.detail
+
+    def is_near(x: Array, y: Array) -> Mask:
+        low, high = shot.lower, shot.upper
+        return np.asarray((x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1]))
+
+    if wanted.ground is None:
+        assert shot.plan is not None
+        name, layout = yield from meanwhile(PLACING, created_ground.created(drafts, wanted, shot.plan))
+        looking = ground_mesh.pressed_vertices.slices(layout.vertices, is_near, shot.terrain)
+        index = yield from meanwhile(PLACING, looking)
+        return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
+
+    name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
+    if vertices is None:  # it was made for the shot
+        vertices = ground_mesh.rest_vertices(settings.found(name), unit_scale)
+    plan = shot.plan or (yield from meanwhile(PLACING, plan_ground.slices(shot.motions)))
+    if plan.footfalls is not None:
+        footfalls = cells_at(plan.footfalls, cell_size)
+        covering = coverage.slices(vertices, slice(None), footfalls, cell_size)
+        cover = yield from meanwhile(PLACING, covering)
+        ground = settings.found(name)
+
+        def is_under(x: Array, y: Array) -> Mask:
+            return among(footfalls, keys_at(np.stack([x, y], axis=-1), cell_size))
+
+        under = yield from meanwhile(PLACING, ground_mesh.pressed_vertices.slices(vertices, is_under, shot.terrain))
+        if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
+            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
+        ):
+            coarse = yield from meanwhile(PLACING, trail_detail.surface_of.slices(ground, unit_scale))
+            region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
+            refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
+            drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
+            drafted = yield from meanwhile(PLACING, drafting)
+            vertices = refinement.at_vertices(coarse, coarse.vertices)
+            looking = ground_mesh.pressed_vertices.slices(vertices, is_near, shot.terrain)
+            index = yield from meanwhile(PLACING, looking)
+            return baked_ground.on_detail(settings.found(name), settings.found(drafted), index, vertices)
+    looking = ground_mesh.pressed_vertices.slices(vertices, is_near, shot.terrain)
+    index = yield from meanwhile(PLACING, looking)
+    return baked_ground.on_itself(settings.found(name), index, vertices)

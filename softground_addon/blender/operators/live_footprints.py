@@ -1,0 +1,89 @@
+"""The buttons that start and end live mode."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty
+
+from .. import jobs, session, settings
+from ..characters.character_setup import characters_of
+from ..ground import baked_ground
+from ..live import live, live_mode, live_start
+from ..reading import analysis
+from ..state import state
+from .modal_bake import ModalJob
+
+
+class SOFTGROUND_OT_live(ModalJob):
+    """Let the ground give way while the timeline plays, or end live mode. Esc cancels"""
+
+    bl_idname = "softground.live"
+    bl_label = "Live Footprints"
+
+    keep: BoolProperty(
+        name="Keep",
+        description="When live mode ends, keep the prints as a bake instead of removing them",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if live mode can start or end; otherwise the button says what is missing."""
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
+        """Effect of the button at the moment."""
+        if not live.is_on():
+            return "Press prints while the timeline plays. Move a slider, and the prints follow. Esc cancels"
+        if properties.keep:
+            return "End live mode and leave the prints on the ground, as a bake up to the current frame. Esc cancels"
+        return "End live mode and leave the ground as it was before"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[live_mode.LiveMode | None]:
+        if state.live is None:
+            return live_start.starting(scene)
+        return _ended(state.live, state.live.current_scene() or scene, keep=self.keep)
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        return nullcontext() if state.live is None else analysis.own_changes(state.live.current_scene() or scene)
+
+    def _show(self, result: live_mode.LiveMode | None) -> None:
+        if result is not None:
+            live.begin(result)
+        session.redraw()
+
+
+def _ended(mode: live_mode.LiveMode, scene: bpy.types.Scene, *, keep: bool) -> jobs.Job[None]:
+    """End live mode, with or without its prints."""
+    if keep:
+        yield from mode.keeping(scene)
+        live.forget()
+    else:
+        live.discard()
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """Reason why live mode can neither start nor end, or an empty text."""
+    options = settings.options_of(context)
+    if session.current().is_baking:
+        return "A bake is running"
+    if live.is_on():
+        return ""
+    if session.is_rendering():
+        return "A render is running: wait until it has ended"
+    if not characters_of(options):
+        return "Add a character first: select its armature and press Add Character"
+    if options.ground and baked_ground.is_baked(options.ground):
+        return "There is a bake on the ground: clear it first"
+    return ""
+
+
+CLASSES = (SOFTGROUND_OT_live,)
