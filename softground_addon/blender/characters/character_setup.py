@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.people import has_two_legs
 from ...core.motion.props import mass_properties
 from ...core.motion.sole_motion import shortest_length
 from ...core.motion.units import scale_to_metres
@@ -26,7 +25,7 @@ from ..sampling.body_sampling import body_frames
 from ..sampling.prop_extraction import surface_of
 from ..sampling.rig_sampling import is_simulated, recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
-from .import_fixes import put_under, size_of, stature_of
+from .import_fixes import is_captured, put_under, size_of, stature_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
@@ -273,16 +272,6 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end
     settings.animated_frames = start, end
-
-
-def has_legs(character: Any) -> bool:
-    """True if a character stands on two legs, as people do."""
-    return has_two_legs(character.joints.keys(), len(character.soles))
-
-
-def is_captured(character: Any) -> bool:
-    """True if a character is the skeleton of a person without a skin, as of motion capture."""
-    return has_legs(character) and not character.skin_mass > 0
 
 
 def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.motion.people import has_two_legs
 from ...core.rig.bones import extent, stature
 from ..compat import action_curves
 from ..rigs.frame_ranges import ancestors
@@ -22,6 +25,16 @@ def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
 def stature_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
     """Its `CharacterMotion.stature` as it stands now [m]; 0 without bones."""
     return stature(_heads(armature), np.array(armature.matrix_world)) * scene.unit_settings.scale_length
+
+
+def has_legs(character: Any) -> bool:
+    """True if a character stands on two legs, as people do."""
+    return has_two_legs(character.joints.keys(), len(character.soles))
+
+
+def is_captured(character: Any) -> bool:
+    """True if a character is the skeleton of a person without a skin, as of motion capture."""
+    return has_legs(character) and not character.skin_mass > 0
 
 
 def _heads(armature: bpy.types.Object) -> NDArray[np.float64]:

@@ -12,8 +12,8 @@ from ...core.motion.motion import JOINTS
 from ...core.motion.units import scale_to_metres, wrong_unit
 from .. import session, settings
 from ..characters import selection
-from ..characters.character_setup import is_captured, title_of
-from ..characters.import_fixes import stature_of
+from ..characters.character_setup import title_of
+from ..characters.import_fixes import is_captured, stature_of
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
