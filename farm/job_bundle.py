@@ -19,6 +19,7 @@ from typing import Any
 
 from softground_addon.batch import manifest
 from softground_addon.batch.manifest import BatchShot
+from softground_addon.batch.manifest_values import frame_range
 from softground_addon.core.errors import InputError, SoftGroundError
 from softground_addon.core.files import files
 
@@ -161,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m farm.job_bundle", description=__doc__.partition("\n")[0])
     parser.add_argument("manifest", type=Path, help="which shots to bake, and how: TOML or JSON")
     parser.add_argument("bundle", type=Path, help="folder for the job bundle; created when missing")
-    parser.add_argument("--frames", type=manifest.frame_range, metavar="A-B", help="frames of shots that name none")
+    parser.add_argument("--frames", type=frame_range, metavar="A-B", help="frames of shots that name none")
     parser.add_argument("--chunk", type=int, default=10, metavar="N", help="frames of a render task; 0: bake only")
     options = parser.parse_args(arguments)
     try:

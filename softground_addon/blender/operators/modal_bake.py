@@ -161,7 +161,7 @@ class ModalJob(bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             _check_still_there(self._needed)
-            result = self._work(until=now + TICK)
+            is_done = self._work(until=now + TICK)
         except SoftGroundError as error:
             self._end()
             self.report({"ERROR"}, str(error))
@@ -169,14 +169,14 @@ class ModalJob(bpy.types.Operator):
         except BaseException:
             self._end()
             raise
-        if result is None:
+        if not is_done:
             return {"PASS_THROUGH"}
         self._end()
-        self._show(result)
+        self._show(self._result)
         return {"FINISHED"}
 
-    def _work(self, until: float) -> Any | None:
-        """Go on with the job until a time; the result if it is done by then."""
+    def _work(self, until: float) -> bool:
+        """Go on with the job until a time; True if it is done by then, with its result, which may be None."""
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
         self._needed |= _needed_by_job(scene)
         blocks = _count_of_blocks()
@@ -193,8 +193,9 @@ class ModalJob(bpy.types.Operator):
                 while goes_on():
                     self._progress = next(self._job)
             except StopIteration as finished:
-                return finished.value
-        return None
+                self._result: Any = finished.value
+                return True
+        return False
 
     def _show_progress(self, progress: jobs.Progress) -> None:
         done = max(session.current().progress, self._done(progress))
@@ -466,8 +467,8 @@ def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
     """Scene, ground, rigs, bodies and soles that a job reads: their names, by their identifiers in this session."""
     options = scene.softground
     soles = [sole.object for character in options.characters for sole in character.soles]
-    rigs = [rig for character in options.characters for rig in (character.armature, character.body)]
-    parts = [part for rig in rigs if rig for part in rig.children_recursive]
+    rigs = [character.armature or character.body for character in options.characters]
+    parts = [part for character in options.characters if character.body for part in character.body.children_recursive]
     blocks = (scene, options.ground, *rigs, *parts, *soles)
     return {block.session_uid: block.name for block in blocks if block}
 

@@ -10,6 +10,7 @@ from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from softground_addon.blender import session
 from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.live import live
 from softground_addon.blender.operators import baked_steps, modal_bake
 from softground_addon.blender.operators.modal_bake import ModalJob
 from softground_addon.blender.reading import analysis
@@ -57,7 +58,7 @@ ON_THE_SPOT = ("walk_ahead", "root_motion")
 
 
 def test_all_buttons_with_a_job_are_pressed_here(addon):
-    named = {"add_character", "add_weather", "change_step", "drop_steps"}
+    named = {"add_character", "add_weather", "change_step", "drop_steps", "live"}
     assert kinds() == {*named, *READING, *BAKING, *EDITING, *ON_THE_SPOT}
 
 
@@ -71,6 +72,19 @@ def test_each_button_works_in_a_window_and_once_more_where_the_shot_is_known(sce
     for name in BAKING:
         result, ticks = press(name)
         assert (result, ticks > 3) == ({"FINISHED"}, True), name
+
+
+def test_live_mode_starts_ends_and_is_kept_in_a_window(scene, press):
+    walker(scene, frames=24)
+    scene.softground.cell_size = 0.03
+    press("add_character")
+    ground = press("create_ground", use_selected=False) and scene.softground.ground
+    for keep in (False, True):
+        result, ticks = press("live")
+        assert (result, ticks > 3, live.is_on()) == ({"FINISHED"}, True, True)
+        scene.frame_set(24)
+        assert press("live", keep=keep)[0] == {"FINISHED"}
+        assert (live.is_on(), ground_mesh.is_baked(ground)) == (False, keep)
 
 
 @pytest.fixture
