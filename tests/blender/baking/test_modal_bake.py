@@ -241,9 +241,10 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
         _scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes, _needed={}
     )
     forever = time.perf_counter() + 1e6
-    assert modal_bake._Bake._work(bake, forever) is None
+    assert modal_bake._Bake._work(bake, forever) is False
     assert bake._progress.fraction == 0.2
-    assert modal_bake._Bake._work(bake, forever) == "written"
+    assert modal_bake._Bake._work(bake, forever) is True
+    assert bake._result == "written"
 
 
 def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
