@@ -607,7 +607,7 @@ CHANGES = {
     "as it was": lambda tree: None,
     "a value": changed_value,
     "a node less": lambda tree: tree.nodes.remove(tree.nodes[40]),
-    "a node more": lambda tree: tree.weather_inputs.new("NodeFrame"),
+    "a node more": lambda tree: tree.nodes.new("NodeFrame"),
     "a link less": lambda tree: tree.links.remove(tree.links[100]),
     "a muted node": lambda tree: setattr(tree.nodes[50], "mute", True),
 }
