@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
-from ..numerics.interpolation import in_stretches
+from ..numerics.interpolation import STRETCH
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
 from ..numerics.smoothing_spline import smooth_path
@@ -135,8 +135,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contact
     """
     tracks = []
     for sole in motion.soles:
-        tracks.append(_track(sole, motion, terrain))
-        yield
+        tracks.append((yield from _track(sole, motion, terrain)))
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
     seen = _seen_on_skin(motion, terrain, tracks)
@@ -253,7 +252,7 @@ class _Track:
     normal: Array  # (N, 3)
 
 
-def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Track:
+def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> Slices[_Track]:
     points = sole.landmark_positions()
 
     def during(steps: slice) -> Array:
@@ -262,7 +261,11 @@ def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Trac
         lowest = clearance.argmin(axis=1)[:, None]
         return np.concatenate([clearance, np.take_along_axis(normals, lowest[..., None], axis=1)[:, 0]], axis=1)
 
-    rise, normal = np.split(in_stretches(during, len(points)), [points.shape[1]], axis=1)
+    parts = []
+    for start in range(0, len(points), STRETCH):
+        parts.append(during(slice(start, start + STRETCH)))
+        yield
+    rise, normal = np.split(np.concatenate(parts), [points.shape[1]], axis=1)
     lowest = rise.argmin(axis=1)
     velocity = _velocities(points, lowest, motion.time_step)
     return _Track(rise.min(axis=1), velocity, rise, normal)
