@@ -14,7 +14,7 @@ from .compat import remove_scene
 from .debris import debris_object
 from .ground import baked_ground
 from .live import live
-from .operators import modal_bake
+from .operators import modal_job
 from .panels.outdated import compare_bake
 from .reading import analysis
 from .sampling.temporary import IS_TEMPORARY
@@ -109,7 +109,7 @@ def end_render(*_: Any) -> None:
 @persistent
 def before_undo(*_: Any) -> None:
     """A bake cannot go on in a scene that is replaced."""
-    modal_bake.stop()
+    modal_job.stop()
 
 
 @persistent
@@ -126,7 +126,7 @@ def after_undo(*_: Any) -> None:
 @persistent
 def before_load(*_: Any) -> None:
     """End with the file whatever goes on."""
-    modal_bake.stop()
+    modal_job.stop()
     try:
         live.discard()
     except InputError:  # a ground in Edit Mode keeps its prints, for Clear Bake

@@ -50,8 +50,8 @@ def longest_pauses(*, during_bake: bool, count: int = 8) -> list[tuple[float, fl
 @contextmanager
 def ticks_timed() -> Iterator[list[tuple[float, float]]]:
     """What the ticks of a bake take of the processor [s], each with how far it was: the add-on's own in the pauses."""
-    bakes = module("operators.modal_bake")
-    tick, ticks = bakes._Bake._tick, []
+    bakes = module("operators.modal_job")
+    tick, ticks = bakes.ModalJob._tick, []
 
     def timed(operator):
         started = time.thread_time()
@@ -60,11 +60,11 @@ def ticks_timed() -> Iterator[list[tuple[float, float]]]:
         finally:
             ticks.append((time.thread_time() - started, bpy.context.window_manager.softground.progress))
 
-    bakes._Bake._tick = timed
+    bakes.ModalJob._tick = timed
     try:
         yield ticks
     finally:
-        bakes._Bake._tick = tick
+        bakes.ModalJob._tick = tick
 
 
 @contextmanager

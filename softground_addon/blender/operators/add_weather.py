@@ -12,7 +12,7 @@ from ..operator_base import OnBake, reports_errors
 from ..playback import weather_modifier
 from ..weather import ground_weather as weather
 from ..weather import weather_result
-from .modal_bake import Reading, Reports
+from .modal_job import Reading, Reports
 
 NONE = "NONE"
 _CHOICES = [

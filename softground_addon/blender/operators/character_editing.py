@@ -16,7 +16,7 @@ from ..characters.import_fixes import has_legs, walk_ahead
 from ..operator_base import reports_errors
 from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
-from .modal_bake import Reading, Reports
+from .modal_job import Reading, Reports
 
 
 def active_character(options: Any) -> Any:

@@ -9,12 +9,11 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import jobs, session, settings
-from ..characters.character_setup import characters_of
 from ..ground import baked_ground
 from ..live import live, live_mode, live_start
 from ..reading import analysis
 from ..state import state
-from .modal_bake import ModalJob
+from .modal_job import BUSY, ModalJob, why_no_start
 
 
 class SOFTGROUND_OT_live(ModalJob):
@@ -72,18 +71,12 @@ def _ended(mode: live_mode.LiveMode, scene: bpy.types.Scene, *, keep: bool) -> j
 
 def _why_not(context: bpy.types.Context) -> str:
     """Reason why live mode can neither start nor end, or an empty text."""
-    options = settings.options_of(context)
-    if session.current().is_baking:
-        return "A bake is running"
     if live.is_on():
-        return ""
-    if session.is_rendering():
-        return "A render is running: wait until it has ended"
-    if not characters_of(options):
-        return "Add a character first: select its armature and press Add Character"
-    if options.ground and baked_ground.is_baked(options.ground):
-        return "There is a bake on the ground: clear it first"
-    return ""
+        return BUSY if session.current().is_baking else ""
+    ground = settings.options_of(context).ground
+    if ground and baked_ground.is_baked(ground):
+        return why_no_start(context) or "There is a bake on the ground: clear it first"
+    return why_no_start(context)
 
 
 CLASSES = (SOFTGROUND_OT_live,)

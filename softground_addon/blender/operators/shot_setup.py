@@ -27,7 +27,7 @@ from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..sampling.body_sampling import deforms
 from ..sampling.rig_sampling import is_animated
 from ..sampling.skin_sampling import meshes_on
-from .modal_bake import Reading, Reports
+from .modal_job import Reading, Reports
 
 
 class SOFTGROUND_OT_add_character(Reading):

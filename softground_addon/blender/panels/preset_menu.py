@@ -16,7 +16,7 @@ from ...core.ground import presets
 from .. import jobs, settings
 from ..characters.character_setup import characters_of, title_of
 from ..operator_base import OnShot, reports_errors
-from ..operators.modal_bake import ReadingShot, Reports
+from ..operators.modal_job import ReadingShot, Reports
 from ..reading import analysis
 from ..settings import user_folder
 from ..state import state

@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from .. import jobs, session, settings
 from ..live import live
 from ..operators import baked_steps, prediction
-from ..operators.modal_bake import Reading, ReadingShot
+from ..operators.modal_job import Reading, ReadingShot
 from ..reading import analysis
 from ..reading.analysis import Analysis
 from ..state import state

@@ -33,7 +33,7 @@ from ..live import live
 from ..operator_base import OnBake
 from ..operators import baked_steps, show_prints
 from ..operators.baked_steps import BakedStep
-from ..operators.modal_bake import STAGE_NAMES, ModalJob
+from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..reading import analysis
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
-from ..numerics.interpolation import STRETCH
+from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
 from ..numerics.smoothing_spline import smooth_path
@@ -261,11 +261,7 @@ def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> Slice
         lowest = clearance.argmin(axis=1)[:, None]
         return np.concatenate([clearance, np.take_along_axis(normals, lowest[..., None], axis=1)[:, 0]], axis=1)
 
-    parts = []
-    for start in range(0, len(points), STRETCH):
-        parts.append(during(slice(start, start + STRETCH)))
-        yield
-    rise, normal = np.split(np.concatenate(parts), [points.shape[1]], axis=1)
+    rise, normal = np.split((yield from in_stretches.slices(during, len(points))), [points.shape[1]], axis=1)
     lowest = rise.argmin(axis=1)
     velocity = _velocities(points, lowest, motion.time_step)
     return _Track(rise.min(axis=1), velocity, rise, normal)

@@ -13,6 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from .orientation import quaternions
 from .rigid import rotation
+from .slices import Slices, sliced
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,8 @@ class Between(np.lib.mixins.NDArrayOperatorsMixin):
         return self._method(self._samples[first : int(position.max()) + 3], position - first)
 
 
-def in_stretches(work: Callable[[slice], Array], count: int) -> Array:
+@sliced
+def in_stretches(work: Callable[[slice], Array], count: int) -> Slices[Array]:
     """Results of `work` for `count` samples, (count, ...), computed stretch by stretch, which bounds its memory."""
     first = work(slice(0, STRETCH))
     if count <= STRETCH:
@@ -86,6 +88,7 @@ def in_stretches(work: Callable[[slice], Array], count: int) -> Array:
     whole = np.empty_like(first, shape=(count, *first.shape[1:]))
     whole[:STRETCH] = first
     for start in range(STRETCH, count, STRETCH):
+        yield
         whole[start : start + STRETCH] = work(slice(start, start + STRETCH))
     return whole
 

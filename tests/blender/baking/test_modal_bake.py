@@ -9,7 +9,7 @@ import pytest
 
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.operators import modal_bake
+from softground_addon.blender.operators import modal_bake, modal_job
 from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
@@ -127,12 +127,12 @@ def test_no_bake_and_no_live_mode_begins_during_a_render(scene, monkeypatch):
 def test_what_was_deleted_under_a_bake_is_named(scene):
     armature = walker(scene, frames=24)
     bpy.ops.softground.add_character()
-    needed = modal_bake._needed_by_job(scene)
+    needed = modal_job._needed_by_job(scene)
     armature.name = "Renamed"
-    modal_bake._check_still_there(needed)
+    modal_job._check_still_there(needed)
     bpy.data.objects.remove(armature)
     with pytest.raises(InputError, match="'Walker' was deleted"):
-        modal_bake._check_still_there(needed)
+        modal_job._check_still_there(needed)
 
 
 def remove_characters(options):
@@ -196,14 +196,14 @@ def works_after(bake, seconds):
     """Whether a tick works that comes some time after the last one [s]."""
     before = bake.worked
     bake._ticked = time.perf_counter() - seconds
-    modal_bake._Bake._tick(bake)
+    modal_job.ModalJob._tick(bake)
     return bake.worked > before
 
 
 def test_events_come_before_more_work_where_blender_draws_for_long(scene):
     bake = SimpleNamespace(worked=0, _gave_way=False, _progress=None, _show_at=0.0, _needed={})
     bake._work = lambda until: setattr(bake, "worked", bake.worked + 1)
-    long = 10 * modal_bake.LONG_DRAWING
+    long = 10 * modal_job.LONG_DRAWING
     assert works_after(bake, 0.0)
     assert [works_after(bake, long) for _ in range(4)] == [False, True, False, True]  # it goes on all the same
     assert works_after(bake, 0.0)
@@ -211,7 +211,7 @@ def test_events_come_before_more_work_where_blender_draws_for_long(scene):
 
 def test_drawing_the_progress_takes_a_small_part_of_the_time_however_long_it_takes(scene, monkeypatch):
     clock, drawing, drawn = [0.0], 0.3, []
-    monkeypatch.setattr(modal_bake.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(modal_job.time, "perf_counter", lambda: clock[0])
     bake = SimpleNamespace(
         _gave_way=False, _progress=jobs.Progress("sample", 0.5), _show_at=0.0, _ticked=0.0, _needed={}
     )
@@ -222,10 +222,10 @@ def test_drawing_the_progress_takes_a_small_part_of_the_time_however_long_it_tak
     bake._work, bake._show_progress = work, lambda _progress: drawn.append(clock[0])
     while clock[0] < 30.0:
         before = len(drawn)
-        modal_bake._Bake._tick(bake)
+        modal_job.ModalJob._tick(bake)
         bake._ticked = clock[0]
-        clock[0] += modal_bake.TIMER_STEP + (drawing if len(drawn) > before else 0.0)
-    assert 15 < len(drawn) < 30.0 / (modal_bake.WORK_PER_DRAWING * drawing)
+        clock[0] += modal_job.TIMER_STEP + (drawing if len(drawn) > before else 0.0)
+    assert 15 < len(drawn) < 30.0 / (modal_job.WORK_PER_DRAWING * drawing)
 
 
 def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
@@ -241,9 +241,9 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
         _scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes, _needed={}
     )
     forever = time.perf_counter() + 1e6
-    assert modal_bake._Bake._work(bake, forever) is False
+    assert modal_job.ModalJob._work(bake, forever) is False
     assert bake._progress.fraction == 0.2
-    assert modal_bake._Bake._work(bake, forever) is True
+    assert modal_job.ModalJob._work(bake, forever) is True
     assert bake._result == "written"
 
 
@@ -264,7 +264,7 @@ def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):
     region = SimpleNamespace(type="UI", x=0, y=0, width=100, height=100, active_panel_category=tab)
     screen = SimpleNamespace(areas=[SimpleNamespace(type="VIEW_3D", regions=[region])])
     event = SimpleNamespace(type=kind, mouse_x=place[0], mouse_y=place[1], ctrl=ctrl)
-    return modal_bake._is_harmless(SimpleNamespace(screen=screen), event)
+    return modal_job._is_harmless(SimpleNamespace(screen=screen), event)
 
 
 def test_a_bake_lets_clicks_through_to_its_own_panels_alone():
@@ -286,7 +286,7 @@ def test_another_window_is_held_while_a_bake_runs(addon, monkeypatch, baking):
 
     def answer(kind, value="PRESS"):
         event = SimpleNamespace(type=kind, value=value, mouse_x=0, mouse_y=0, ctrl=False)
-        return modal_bake.SOFTGROUND_OT_hold_window.modal(None, context, event)
+        return modal_job.SOFTGROUND_OT_hold_window.modal(None, context, event)
 
     held, let_through = {"RUNNING_MODAL"}, {"PASS_THROUGH"} if baking else {"FINISHED", "PASS_THROUGH"}
     assert answer("MOUSEMOVE", "NOTHING") == let_through
@@ -334,8 +334,8 @@ def test_a_rig_that_is_deleted_while_its_feet_are_looked_for_is_named(scene):
 def test_a_tick_asks_for_what_it_reads_without_walking_over_all_objects(scene):
     prepare(scene, "coarse")
     fill(scene, 10_000)
-    needed = modal_bake._needed_by_job(scene)
-    look = partial(modal_bake._check_still_there, needed)
+    needed = modal_job._needed_by_job(scene)
+    look = partial(modal_job._check_still_there, needed)
     assert least_seconds(look) < least_seconds(walk_over_all_objects) / 5
 
 

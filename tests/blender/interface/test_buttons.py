@@ -11,8 +11,8 @@ from sample_scenes.gait import Gait, walk
 from softground_addon.blender import session
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.live import live
-from softground_addon.blender.operators import baked_steps, modal_bake
-from softground_addon.blender.operators.modal_bake import ModalJob
+from softground_addon.blender.operators import baked_steps, modal_job
+from softground_addon.blender.operators.modal_job import ModalJob
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
 from softground_addon.blender.viewport import step_editing
@@ -48,7 +48,7 @@ def press(scene, monkeypatch):
         return result, ticks
 
     yield pressed
-    modal_bake.stop()
+    modal_job.stop()
 
 
 READING = ("detect_bones", "create_ground", "use_as_ground", "predict_depth", "overlay", "read_again")
@@ -129,7 +129,7 @@ def test_edits_that_change_nothing_touch_nothing(scene, press, steps):
 def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatch, steps):
     before, left = fingerprints.of_file(), 0
     monkeypatch.setattr(ModalJob, "execute", ModalJob._start)
-    monkeypatch.setattr(modal_bake, "TICK", 0.0)
+    monkeypatch.setattr(modal_job, "TICK", 0.0)
     for ticks in itertools.count(step=9):
         bpy.ops.softground.mute_step(step=steps[1])
         for _ in range(ticks):
