@@ -2,7 +2,7 @@
 
 import pytest
 
-pytestmark = pytest.mark.timeout(1500)
+pytestmark = [pytest.mark.timeout(1500), pytest.mark.alone]  # by the time of the processor
 
 LONGEST_WAIT = 1.5
 """From letting go of a slider at frame 150 until all prints are as the settings say [s]."""

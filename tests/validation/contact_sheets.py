@@ -26,7 +26,7 @@ import softground_addon
 from softground_addon.blender import jobs
 from softground_addon.blender.characters.selection import set_up_automatically
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
-from softground_addon.core.composers.self_check import BESIDE, NEAR
+from softground_addon.core.checks.skin_check import BESIDE, NEAR
 from softground_addon.core.ground.heightfield import Terrain
 from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.motion.motion import LowSkin

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.composers.self_check import no_motion
+from ...core.checks.self_check import no_motion
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion

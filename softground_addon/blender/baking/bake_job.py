@@ -17,11 +17,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings, offsets_mm, press_shot
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import gap_table, response_findings, suggested_speeds, worst_gaps
-from ...core.composers.self_check import bottomed_out, self_check
 from ...core.debris.debris import Debris
 from ...core.events.events import as_edited, events
 from ...core.files import report

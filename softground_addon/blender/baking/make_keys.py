@@ -25,7 +25,7 @@ from ..reading.shots import settings_of
 from ..response import response_job
 from ..response.character_keys import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ..rigs.frame_ranges import animated_frames
-from ..sampling.rig_sampling import object_named, sampling_scene, still_there
+from ..sampling.sampling_scene import object_named, sampling_scene, still_there
 from ..sampling.temporary import handlers_silent
 from . import bake_report
 

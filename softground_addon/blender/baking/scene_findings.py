@@ -20,7 +20,7 @@ from ..reading.shots import Shot
 from ..rigs.frame_ranges import playing_tracks
 from ..sampling.body_sampling import deforms, meshes_of
 from ..sampling.instances import crowd_finding, instancers
-from ..sampling.rig_sampling import object_named
+from ..sampling.sampling_scene import object_named
 
 UPRIGHT = 0.9998
 """Gravity whose downward part is less than this points elsewhere (1°)."""

@@ -23,7 +23,8 @@ from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature
 from ..sampling.body_sampling import body_frames
 from ..sampling.prop_extraction import surface_of
-from ..sampling.rig_sampling import is_simulated, recorded_motion, sample_character
+from ..sampling.rig_recording import is_simulated
+from ..sampling.rig_sampling import recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .import_fixes import is_captured, put_under, size_of, stature_of
 from .recognition import SHARE, Recognised, recognise, recognise_body

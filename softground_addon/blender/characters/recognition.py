@@ -24,7 +24,8 @@ from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
-from ..sampling.rig_sampling import is_animated, record
+from ..sampling.rig_checks import is_animated
+from ..sampling.rig_recording import record
 from ..sampling.skin_sampling import read_skin
 from ..settings import found, name_of, units_of
 

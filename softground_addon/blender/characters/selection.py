@@ -13,7 +13,8 @@ from ..rigs.rig_mapping import instances_armature, parts_of, require_armature
 from ..rigs.worn_rigs import worn_rigs
 from ..sampling.body_sampling import deforms
 from ..sampling.instances import crowd_finding, instancers
-from ..sampling.rig_sampling import is_animated, is_simulated
+from ..sampling.rig_checks import is_animated
+from ..sampling.rig_recording import is_simulated
 from ..sampling.skin_sampling import meshes_on
 from .character_setup import add_character, adding_body
 

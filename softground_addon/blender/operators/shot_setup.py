@@ -25,7 +25,7 @@ from ..response import response_job
 from ..rigs import frame_ranges
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..sampling.body_sampling import deforms
-from ..sampling.rig_sampling import is_animated
+from ..sampling.rig_checks import is_animated
 from ..sampling.skin_sampling import meshes_on
 from .modal_job import Reading, Reports
 

@@ -36,7 +36,8 @@ from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
 from ..sampling.control_poses import RigPoses
 from ..sampling.prop_extraction import check_props
-from ..sampling.rig_sampling import check_rig, sample_character, sample_prop
+from ..sampling.rig_checks import check_rig
+from ..sampling.rig_sampling import sample_character, sample_prop
 from ..weather import ground_weather as weather
 from . import hard_ground
 

@@ -23,7 +23,7 @@ from ..playback.own_data import FINGERPRINTS
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.worn_rigs import worn_rigs
 from ..sampling.body_sampling import meshes_of
-from ..sampling.rig_sampling import object_named
+from ..sampling.sampling_scene import object_named
 from ..sampling.skin_sampling import meshes_on
 from . import input_hashes
 

@@ -18,7 +18,7 @@ from ...core.rig.mapping import RigMapping
 from ...core.settings import ObjectName
 from ..animation_layer.layer_curves import LayerCurve, path_of_bone
 from ..sampling.control_poses import RigPoses
-from ..sampling.rig_sampling import check_bones
+from ..sampling.rig_checks import check_bones
 from ..settings import found
 from .rig_controls import BODY, Control, find_controls
 

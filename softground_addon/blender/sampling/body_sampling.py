@@ -22,7 +22,8 @@ from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import parts_of
 from ..settings import found
-from .rig_sampling import check_frames, check_mass, object_named, sampling_scene, still_there
+from .rig_checks import check_frames, check_mass
+from .sampling_scene import object_named, sampling_scene, still_there
 from .skin_sampling import mesh_of
 from .temporary import handlers_silent
 

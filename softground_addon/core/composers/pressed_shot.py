@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks.volumes import check_volumes
 from ..findings import Finding
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
@@ -20,7 +21,6 @@ from ..record.record import BakeRecord
 from ..settings import BakeSettings
 from .edited_steps import with_edits
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
-from .self_check import check_volumes
 from .shot_loads import loads_of_shot
 from .simulation import simulate
 

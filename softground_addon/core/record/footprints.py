@@ -132,6 +132,10 @@ class Footprint:
             total += np.bincount(cells[part], weights=amounts[part] * passed, minlength=len(total))
         return (total * QUANTUM).reshape(self.window.rows, self.window.columns)
 
+    def middle(self, frames: Array) -> int:
+        """The sample, of those at some scene frames (F,), that is nearest to the middle of the contact."""
+        return int(np.abs(frames - (self.start_frame + self.end_frame) / 2).argmin())
+
     @property
     def load_spacing(self) -> float:
         """Scene frames from one of `load_frames` to the next."""

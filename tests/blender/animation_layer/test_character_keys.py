@@ -12,7 +12,7 @@ from softground_addon.blender.compat import action_curves, set_slot, slot_of
 from softground_addon.blender.panels import response_panel
 from softground_addon.blender.response import response_job
 from softground_addon.blender.response.character_keys import controls_of
-from softground_addon.blender.sampling import rig_sampling
+from softground_addon.blender.sampling import rig_recording
 from softground_addon.core.dynamics.centre_of_mass import centre_of_mass
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
@@ -82,13 +82,13 @@ def test_soles_stand_on_the_ground_that_they_pressed(armature):
 def test_a_rig_is_evaluated_once_for_its_motion_and_its_response_or_not_at_all(scene, monkeypatch, rig, times):
     armature, entered = MAKE[rig](scene), []
     set_up(armature)
-    sampling_scene = rig_sampling.sampling_scene
+    sampling_scene = rig_recording.sampling_scene
 
     def counted(*arguments, **options):
         entered.append(arguments)
         return sampling_scene(*arguments, **options)
 
-    monkeypatch.setattr(rig_sampling, "sampling_scene", counted)
+    monkeypatch.setattr(rig_recording, "sampling_scene", counted)
     responders.bake(scene)
     assert has_layer(armature)
     assert len(entered) == times

@@ -8,7 +8,7 @@ from softground_addon.blender import mesh_arrays
 from softground_addon.blender.baking.bake_report import shapes_left_out
 from softground_addon.blender.reading import staleness
 from softground_addon.blender.rigs.rig_mapping import rest_bones
-from softground_addon.blender.sampling.rig_sampling import record
+from softground_addon.blender.sampling.rig_recording import record
 from softground_addon.blender.sampling.skin_sampling import read_skin
 from softground_addon.blender.settings import snapshot, units_of
 from softground_addon.core.rig.rig_skin import skinned

@@ -10,7 +10,7 @@ from softground_addon.blender import handlers
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
-from softground_addon.blender.sampling import rig_sampling, temporary
+from softground_addon.blender.sampling import sampling_scene, temporary
 from tests.blender.shots import walker
 
 IDLE_LINES = 8
@@ -81,7 +81,7 @@ def test_an_edited_action_makes_the_prediction_worthless(scene):
 
 def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene, tmp_path):
     path, mine = str(tmp_path / "autosave.blend"), scene.name
-    with rig_sampling.sampling_scene(scene, "", (), ()):
+    with sampling_scene.sampling_scene(scene, "", (), ()):
         bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     bpy.ops.wm.open_mainfile(filepath=path)
     assert [s.name for s in bpy.data.scenes] == [mine]

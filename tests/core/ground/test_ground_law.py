@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from softground_addon.core.composers.self_check import check_volumes
+from softground_addon.core.checks.volumes import check_volumes
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.ground_law import load_at, strain
 from softground_addon.core.ground.hand_hardness import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.self_check import WALK_RATIO, bottomed_out, self_check
+from softground_addon.core.checks.self_check import WALK_RATIO, bottomed_out, self_check
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.findings import Finding, worst_first
 from softground_addon.core.ground import presets

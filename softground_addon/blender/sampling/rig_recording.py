@@ -1,0 +1,216 @@
+"""Matrices of bones and objects over time: from keys alone where nothing else moves a rig, or evaluated by frames."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import nullcontext
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.findings import Finding
+from ...core.rig.recording import Recording
+from ...core.settings import SceneUnits
+from ..animation_layer.constraint_layer import LayerKind, without_layers
+from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
+from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
+from .rig_checks import check_finite
+from .sampling_scene import object_named, sampling_scene, still_there, user_scene
+from .temporary import handlers_silent
+
+
+def record(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    frames: range,
+    bones: Iterable[str],
+    units: SceneUnits,
+    props: Sequence[str] = (),
+    shapes: Sequence[tuple[str, str]] = (),
+    *,
+    below: LayerKind = LayerKind.RESPONSE,
+    findings: list[Finding] | None = None,
+) -> Generator[int, None, Recording]:
+    """Where some bones of a rig and some objects are over time, and what values some shape keys of objects have.
+
+    Yields the number of frames read.
+
+    Raises InputError, with the frame, where that is no place.
+    """
+    names, rig, full_name = list(dict.fromkeys(bones)), armature.name, armature.name_full
+    handled = yield from _moved_by_handlers(scene, full_name, frames, names, props)
+    with without_layers(object_named(full_name), below):
+        keyed = not (props or shapes or handled) and is_moved_by_keys_alone(object_named(full_name), names)
+    if keyed:
+        recording = yield from _read_keys(full_name, frames, names, units, below)
+    else:
+        recording = yield from _evaluate(scene, full_name, frames, names, units, props, shapes, below, handled=handled)
+    if handled and findings is not None:
+        findings.append(handled_finding(rig))
+    check_finite(rig, recording)
+    return recording
+
+
+def record_props(
+    scene: bpy.types.Scene,
+    name: str,
+    frames: range,
+    units: SceneUnits,
+    props: Sequence[str],
+    *,
+    findings: list[Finding] | None = None,
+) -> Generator[int, None, Recording]:
+    """Where some objects are over time; `name` is what the user calls them together.
+
+    Yields the number of frames read.
+
+    Raises InputError, with the frame, where that is no place.
+    """
+    handled = yield from _moved_by_handlers(scene, "", frames, [], props)
+    recording = yield from _evaluate(scene, "", frames, [], units, props, handled=handled)
+    if handled and findings is not None:
+        findings.append(handled_finding(name))
+    check_finite(name, recording)
+    return recording
+
+
+def _read_keys(
+    armature: str, frames: range, bones: Sequence[str], units: SceneUnits, below: LayerKind
+) -> Generator[int, None, Recording]:
+    """Record the matrices of a rig that nothing but its keys moves, bone by bone.
+
+    Yields the frames that come to as much work.
+    """
+    times = np.array(frames) * units.time_stretch
+    chain = with_parents(object_named(armature), bones)
+    poses = np.empty((len(frames), len(chain), 4, 4), dtype=np.float32)
+    for done, name in enumerate(chain):
+        obj = object_named(armature)
+        above = obj.data.bones[name].parent
+        parent = np.swapaxes(poses[:, chain.index(above.name) if above else done], -1, -2)
+        with without_layers(obj, below):
+            poses[:, done] = np.swapaxes(keyed_pose(obj, name, times, parent), -1, -2)
+        yield len(frames) * (done + 1) // len(chain)
+    obj = object_named(armature)
+    with without_layers(obj, below):
+        world = keyed_world(obj, times)
+    return Recording(
+        frames=np.array(frames, dtype=float),
+        bones=tuple(chain),
+        poses=poses,
+        world=world,
+        props={},
+        units=units,
+    )
+
+
+def _evaluate(
+    scene: bpy.types.Scene,
+    armature: str,
+    frames: range,
+    bones: Sequence[str],
+    units: SceneUnits,
+    props: Sequence[str],
+    shapes: Sequence[tuple[str, str]] = (),
+    below: LayerKind = LayerKind.RESPONSE,
+    *,
+    handled: bool,
+) -> Generator[int, None, Recording]:
+    """Record the matrices frame by frame, yielding the number of frames done; without an armature, of props alone.
+
+    `handled` lets frame handlers of others act.
+    """
+    poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
+    prop_matrices = np.empty((len(frames), len(props), 4, 4))
+    values = np.empty((len(shapes), len(frames)))
+    armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
+    simulated = any(is_simulated(object_named(obj)) for obj in props)
+    source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, props, shapes, handled=handled)
+    with source as name:
+        for frame in _simulated_before(scene, frames.start) if simulated else ():
+            with handlers_silent():
+                still_there(name).frame_set(frame)
+            yield 0
+        for done, frame in enumerate(frames):
+            temporary = still_there(name)
+            if handled:
+                let_handlers_act(temporary, frame)
+            with handlers_silent(), without_layers(object_named(armature), below) if armature else nullcontext():
+                temporary.frame_set(frame)
+                depsgraph = temporary.view_layers[0].depsgraph
+                assert depsgraph is not None
+                if armature:
+                    evaluated = object_named(armature).evaluated_get(depsgraph)
+                    armature_matrices[done] = evaluated.matrix_world
+                    pose = evaluated.pose.bones
+                    if done == 0:
+                        places = [pose.find(bone) for bone in bones]
+                        buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
+                    pose.foreach_get("matrix", buffer.reshape(-1))
+                    poses[done] = buffer[places]
+            for place, obj in enumerate(props):
+                prop_matrices[done, place] = object_named(obj).evaluated_get(depsgraph).matrix_world
+            for place, (obj, key) in enumerate(shapes):
+                keys = object_named(obj).data.shape_keys.evaluated_get(depsgraph)
+                values[place, done] = keys.key_blocks[key].value
+            yield done + 1
+    yield len(frames)
+
+    prop_matrices[..., :3, :] *= units.unit_scale_m
+    return Recording(
+        frames=np.array(frames, dtype=float),
+        bones=tuple(bones),
+        poses=poses,
+        world=armature_matrices,
+        props={obj: prop_matrices[:, place] for place, obj in enumerate(props)},
+        units=units,
+        shapes=dict(zip(shapes, values, strict=True)),
+    )
+
+
+def is_simulated(obj: bpy.types.Object) -> bool:
+    """Return whether Blender's rigid bodies move an object, or one that it is parented to."""
+    node: bpy.types.Object | None = obj
+    while node is not None:
+        if node.rigid_body and node.rigid_body.type == "ACTIVE":
+            return True
+        node = node.parent
+    return False
+
+
+def _moved_by_handlers(
+    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], props: Sequence[str]
+) -> Generator[int, None, bool]:
+    """True if frame handlers of others move a rig or objects, from a few frames with them and without."""
+    if not moving_handlers() or any(is_simulated(object_named(obj)) for obj in props):
+        return False
+    objects = [*([armature] if armature else []), *props]
+    with sampling_scene(scene, armature, bones, props, handled=True) as name:
+        for frame in dict.fromkeys((frames[0], frames[len(frames) // 3], frames[-1])):
+            seen: list[Any] = []
+            for handled in (False, True):
+                temporary = still_there(name)
+                if handled:
+                    let_handlers_act(temporary, frame)
+                with handlers_silent():
+                    temporary.frame_set(frame)
+                depsgraph = temporary.view_layers[0].depsgraph
+                assert depsgraph is not None
+                at = [object_named(obj).evaluated_get(depsgraph) for obj in objects]
+                poses = (at[0].pose.bones[bone].matrix for bone in bones)
+                seen.append(np.array([*(obj.matrix_world for obj in at), *poses]))
+            yield 0
+            if not np.allclose(seen[0], seen[1], rtol=1e-5, atol=1e-5, equal_nan=True):
+                return True
+    return False
+
+
+def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
+    """Frames to step through before the first one.
+
+    Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
+    cache.
+    """
+    world = scene.rigidbody_world
+    return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)

@@ -1,0 +1,196 @@
+"""A bake judged by the skin: where it rests, ground and prints must be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..findings import Finding
+from ..ground.hard_ground import bare, up_to
+from ..ground.heightfield import Terrain
+from ..loads.contacts import LEAVE_HEIGHT
+from ..loads.estimate import CharacterLoads
+from ..loads.missing_ground import beyond_edge
+from ..motion.motion import CharacterMotion, LowSkin
+from ..numerics.slices import Slices
+from ..record.footprints import Footprint
+from ..skin.ground_level import SUNK
+from ..skin.skin_motion import CALM_SPEED
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+OFF_SKIN = 0.012
+"""The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
+NEAR = 0.015
+"""Calm skin this near to where it rests touches, in body heights (`skin.bearing.TOUCH`)."""
+BESIDE = 0.15
+"""A step within this of touching skin is that skin's, in body heights: a foot's length."""
+DISAGREE = 0.15
+"""Share of steps, and of moments of rest, that may go without the other: brushes, and the ends of contacts."""
+LEAST_REST = 3
+"""Frames of rest without a step that may be the rounding of a contact's ends."""
+BIN = 0.004
+"""Step of the levels that are tried, in body heights (`skin.ground_level.BIN`)."""
+STANDING_PERCENTILE = 20.0
+"""Percentile of the lowest skin that is on the ground: a walker has a foot there nearly always."""
+SOME_FRAMES = 200
+"""Frames whose skin is looked up on the ground in one go."""
+
+
+def skin_check(
+    character: CharacterLoads, skin: LowSkin, steps: Sequence[Footprint], terrain: Terrain, ground: str
+) -> Slices[list[Finding]]:
+    """Findings where ground, steps and resting skin disagree."""
+    motion = character.motion
+    beyond, soft = beyond_edge(motion, terrain), bare(terrain)
+    height, has_ground = np.empty(skin.rise.shape), np.empty(skin.rise.shape, dtype=bool)
+    for start in range(0, len(height), SOME_FRAMES):
+        now = slice(start, start + SOME_FRAMES)
+        x, y, z = np.moveaxis(skin.position[now], -1, 0)
+        height[now] = z - up_to(beyond, z + LEAVE_HEIGHT * motion.leg_length).heights(x, y)
+        has_ground[now] = np.isfinite(soft.heights(x, y))
+        yield
+    height[~np.isfinite(height)] = np.inf
+    over = _resting(height, skin)
+    if over is None:
+        return []
+    findings: list[Finding] = []
+    if abs(over) > OFF_SKIN * skin.height:
+        if level := level_on_slope(character, steps, terrain, ground, abs(over)):
+            return level
+        side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
+        findings.append(
+            Finding(
+                "ground_off_skin",
+                "error",
+                f"The skin of '{motion.name}' rests {abs(over) * 100:.1f} cm {side} '{ground}'",
+                f"move the ground {ground_way} by as much, or the character {body_way}.",
+            )
+        )
+    else:
+        over = 0.0  # what presses is the ground itself, and the feet may rest a little apart
+    rise = (height - over) / skin.height
+    touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
+    if steps:
+        findings += yield from _skin_and_steps(motion, touching, steps)
+    return findings
+
+
+def level_on_slope(
+    character: CharacterLoads, steps: Sequence[Footprint], terrain: Terrain, ground: str, off: float
+) -> list[Finding]:
+    """Soles that lie level on ground that slopes, where they are `off` it [m], or without a skin may be."""
+    motion, contacts = character.motion, character.contacts
+    if not _stands_level(motion, steps, terrain, off):
+        return []
+    slope = float(np.median(contacts.normal[contacts.touching][:, 2]))
+    return [
+        Finding(
+            "level_on_slope",
+            "error",
+            f"The feet of '{motion.name}' stand level where '{ground}' slopes by {np.degrees(np.arccos(slope)):.0f}°",
+            "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+        )
+    ]
+
+
+def _stands_level(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:
+    """Return whether soles lie level on ground that slopes, so that no move of it mends that skin is `off` it [m]."""
+    soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
+    spans = [np.zeros((0, 2))]
+    for step in steps:
+        if step.sole in soles:
+            x, y, z = soles[step.sole].landmark_positions()[step.middle(motion.frames)].T
+            spans.append(np.ptp([z, z - terrain.heights(x, y)], axis=1)[None])
+    known = np.concatenate(spans)
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
+        return False
+    of_sole, over_ground = np.median(known, axis=0)
+    return bool(over_ground > max(off, 2 * of_sole))
+
+
+@dataclass(frozen=True)
+class _Touching:
+    """Where skin rests on the ground."""
+
+    skin: LowSkin
+    on: Mask
+    """Which parts are where they rest on the ground, (F, P)."""
+    down: Mask
+    """The same, also beyond its edge, and of parts that have sunk into it: some of their skin is at its level."""
+
+    def near(self, step: Footprint, frames: slice, reach: float) -> Mask:
+        """At which of some frames skin touches within reach of a step."""
+        apart = np.linalg.norm(self.skin.position[frames, :, :2] - step.position[:2], axis=-1)
+        calm = self.skin.rise[frames] < self.skin.calm
+        return np.asarray((self.down[frames] & calm & (apart < reach)).any(axis=1))
+
+    @property
+    def rests(self) -> Mask:
+        """When some skin touches and is calm however fast the body is, (F,)."""
+        return np.asarray((self.on & (self.skin.rise < CALM_SPEED * self.skin.height)).any(axis=1))
+
+
+def _resting(height: Array, skin: LowSkin) -> float | None:
+    """How far over the ground the skin rests [m], by the low envelope or where calm skin is lowest most often."""
+    lowest = height.min(axis=1)
+    lowest = lowest[np.isfinite(lowest)]
+    if not len(lowest):
+        return None
+    levels = [float(np.percentile(lowest, STANDING_PERCENTILE))]
+    calm = np.where(skin.rise < CALM_SPEED * skin.height, height, np.inf).min(axis=1)
+    calm = calm[np.isfinite(calm)]
+    if len(calm):
+        number = np.round(calm / (BIN * skin.height)).astype(np.int64)
+        values, counts = np.unique(number, return_counts=True)
+        votes = [counts[np.abs(values - value) <= 1].sum() for value in values]
+        levels.append(float(calm[np.abs(number - values[int(np.argmax(votes))]) <= 1].mean()))
+    return min(levels, key=abs)
+
+
+def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequence[Footprint]) -> Slices[list[Finding]]:
+    """Steps without skin, and skin that rests without a step."""
+    frames, height = touching.skin.frames, touching.skin.height
+    soles = {sole.sole.name: sole for sole in motion.soles}
+    covered = np.zeros(len(frames), dtype=bool)
+    seen, alone = 0, []
+    for step in steps:
+        yield
+        sole = soles[step.sole]
+        reach = max(BESIDE * height, sole.sole.length)
+        first, last = np.searchsorted(frames, [step.start_frame - 1, step.end_frame + 1 + 1e-6])
+        covered[first:last] |= touching.near(step, slice(first, last), reach)
+        if sole.bears is not None:
+            middle = step.middle(frames)
+            seen += 1
+            if not touching.near(step, slice(middle, middle + 1), reach).any():
+                alone.append(step.start_frame)
+    findings = []
+    if len(alone) > DISAGREE * seen:
+        findings.append(
+            Finding(
+                "step_without_skin",
+                "error",
+                f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
+                "on",
+                "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
+            )
+        )
+    rests = touching.rests
+    missed = np.flatnonzero(rests & ~covered)
+    if len(missed) > max(DISAGREE * rests.sum(), LEAST_REST):
+        findings.append(
+            Finding(
+                "skin_without_step",
+                "error",
+                f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
+                f"{frames[missed[0]]:.0f} on",
+                "add what rests there with Add Contact in Advanced > Contacts.",
+            )
+        )
+    return findings
