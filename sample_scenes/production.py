@@ -28,7 +28,7 @@ import softground_addon
 from sample_scenes import stage
 from softground_addon.blender import jobs, setting_paths
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters import character_setup
+from softground_addon.blender.characters import contact_editing
 from softground_addon.blender.ground import baked_ground
 from softground_addon.core.record.footprints import Footprint, recompose
 
@@ -174,9 +174,9 @@ def bake(
                 sole.object = shoe
         found = {sole.bone for sole in shot.characters[-1].soles}
         if more := [bone for bone in walker.more if bone not in found]:
-            character_setup.add_bone_contacts(shot.characters[-1], more)
+            contact_editing.add_bone_contacts(shot.characters[-1], more)
         if walker.held:
-            character_setup.add_object_contacts(scene, shot.characters[-1], walker.held)
+            contact_editing.add_object_contacts(scene, shot.characters[-1], walker.held)
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         setting_paths.assign(shot, path, value)

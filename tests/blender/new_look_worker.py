@@ -31,7 +31,7 @@ def volcanic_ash(graph: Graph, ground: surface_shaders.Ground) -> surface_shader
 
 def bake(folder: Path) -> dict[str, object]:
     """What becomes of a walk on the new ground."""
-    from softground_addon.blender import settings
+    from softground_addon.blender import ground_presets
     from softground_addon.blender.debris import debris_object
     from softground_addon.blender.ground import baked_ground
     from softground_addon.blender.output import export_formats
@@ -41,7 +41,7 @@ def bake(folder: Path) -> dict[str, object]:
     scene = bpy.context.scene
     shots.walker(scene, frames=40)
     text = json.dumps(json.loads(presets.dump(presets.find("fresh_snow"))) | {"name": "Ash", "surface": RECORD.name})
-    settings.apply_preset(scene.softground, presets.parse(text, "volcanic_ash.json"))
+    ground_presets.apply_preset(scene.softground, presets.parse(text, "volcanic_ash.json"))
     shots.coarse(scene)
     scene.softground.frame_end, scene.softground.debris, scene.softground.relief = 40, True, "FINE"
     bpy.ops.softground.add_character()

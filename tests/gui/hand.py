@@ -20,6 +20,9 @@ Steps = Iterator[Pause]
 PAGES = 2
 """How often the sidebar is looked through, each time further down."""
 
+PATIENCE = 4.0
+"""How many times longer than a quiet machine a busy one may take before a story gives up."""
+
 SHORT: Pause = 0.03
 ROW = 11
 """Distance between two places where a button is looked for, little more than half a button's height [px]."""
@@ -81,9 +84,10 @@ class Hand:
         yield SHORT
 
     def wait_for(self, condition: Callable[[], bool], seconds: float) -> Steps:
+        """Wait for what a quiet machine does in some seconds, and a busy one in `PATIENCE` times as many."""
         waited = 0.0
         while not condition():
-            if waited > seconds:
+            if waited > PATIENCE * seconds:
                 raise TimeoutError(f"waited {seconds} s in vain")
             yield 0.1
             waited += 0.1

@@ -22,12 +22,12 @@ from ...core.files import files, report
 from ...core.ground import presets
 from ...core.record.archive import LARGEST_TEXT
 from ...core.record.edits import StepEdit, from_json
-from .. import jobs, setting_paths, settings
+from .. import ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
+from ..ground_presets import user_folder
 from ..output import export_formats
 from ..response import response_job
-from ..settings import user_folder
 from . import cli_arguments, program
 from .saving import check_places, files_read, save_copy, save_target
 
@@ -149,7 +149,7 @@ def _bake(options: argparse.Namespace) -> None:
     edits = _edits(options.edits) if options.edits else None
     set_up_automatically(scene)
     if options.preset:
-        settings.apply_preset(scene.softground, _preset(options.preset))
+        ground_presets.apply_preset(scene.softground, _preset(options.preset))
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
     if options.cell_size is not None:

@@ -11,7 +11,7 @@ from bpy.props import StringProperty
 from ...core.errors import InputError
 from ...core.motion.people import likely_mass
 from .. import jobs, settings
-from ..characters import character_setup
+from ..characters import character_setup, contact_editing
 from ..characters.import_fixes import has_legs, walk_ahead
 from ..operator_base import reports_errors
 from ..reading import analysis
@@ -188,19 +188,19 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             if character is None:
                 raise InputError(f"'{posed.name}' is not a character yet: press Add Character first.")
             bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
-            added = character_setup.add_bone_contacts(character, bones)
+            added = contact_editing.add_bone_contacts(character, bones)
         elif context.mode == "EDIT_MESH" and context.object is not None:
             rig = context.object.find_armature()
             character = next((item for item in scene.softground.characters if rig and item.armature == rig), None)
             if character is None:
                 raise InputError(f"'{context.object.name}' is not the skin of a character: press Add Character first.")
-            added = character_setup.add_vertex_contacts(character, context.object)
+            added = contact_editing.add_vertex_contacts(character, context.object)
         else:
             characters = scene.softground.characters
             props = [obj for obj in context.selected_objects if all(obj != item.armature for item in characters)]
             wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene.softground)
-            added = character_setup.add_object_contacts(scene, character, props)
+            added = contact_editing.add_object_contacts(scene, character, props)
         self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")
         return {"FINISHED"}
 

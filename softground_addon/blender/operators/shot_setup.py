@@ -13,10 +13,10 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import jobs, session, settings
+from .. import ground_presets, jobs, session, settings
 from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
-from ..characters import character_setup, recognition, selection
+from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look
 from ..operator_base import reports_errors
@@ -47,7 +47,7 @@ def _added(
     """Add what is selected, and read the shot for its prediction; the reports of it, each with its kind."""
     options = scene.softground
     before = len(options.characters), options.active_character, options.frame_start, options.frame_end
-    fresh, material = settings.untouched(options), options.material
+    fresh, material = ground_presets.untouched(options), options.material
     sizes = [(options, "cell_size"), (options, "cells_along_sole"), (options, "length_scale")]
     sizes += [(material, "rim_reach"), (material, "blur_sigma")]
     fitted = [(group, field, getattr(group, field)) for group, field in sizes]
@@ -98,7 +98,7 @@ def _add(
         else:
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
     props = [settings.found(prop) for prop in remaining]
-    added = character_setup.add_props(scene, props) if props else []
+    added = prop_setup.add_props(scene, props) if props else []
     if added:
         reports.append(("INFO", "Added " + ", ".join(f"'{entry.name}' of {entry.mass:g} kg" for entry in added)))
     for obj in props:

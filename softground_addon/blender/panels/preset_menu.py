@@ -13,12 +13,12 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from ...core.errors import InputError
 from ...core.files import files
 from ...core.ground import presets
-from .. import jobs, settings
+from .. import ground_presets, jobs, settings
 from ..characters.character_setup import characters_of, title_of
+from ..ground_presets import user_folder
 from ..operator_base import OnShot, reports_errors
 from ..operators.modal_job import ReadingShot, Reports
 from ..reading import analysis
-from ..settings import user_folder
 from ..state import state
 from . import preset_icons
 
@@ -36,14 +36,14 @@ def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
 
 def title_of_ground(options: Any) -> str:
     """The name of the preset that was loaded last, and whether the ground is still as it says."""
-    name = settings.preset_of(options)
+    name = ground_presets.preset_of(options)
     _, preset = next(_presets_of(name), (None, None))
-    return f"{name} (modified)" if preset and not settings.holds(options, preset) else name
+    return f"{name} (modified)" if preset and not ground_presets.holds(options, preset) else name
 
 
 def picture_of_ground(options: Any) -> int:
     """The number of the picture of the preset that was loaded last; 0 where it has none."""
-    return next(filter(None, (preset_icons.of(path) for path, _ in _presets_of(settings.preset_of(options)))), 0)
+    return next(filter(None, (preset_icons.of(path) for path, _ in _presets_of(ground_presets.preset_of(options)))), 0)
 
 
 def _presets_of(name: str) -> Iterator[tuple[Path, presets.Preset]]:
@@ -117,7 +117,7 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        settings.apply_preset(settings.options_of(context), _chosen(self))
+        ground_presets.apply_preset(settings.options_of(context), _chosen(self))
         return {"FINISHED"}
 
 
@@ -163,7 +163,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
             raise InputError(
                 f"You have a preset like '{name}' ({older[0].name}): choose another name, or tick Replace."
             )
-        preset = settings.as_preset(scene.softground, name, self.source)
+        preset = ground_presets.as_preset(scene.softground, name, self.source)
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_text(path, presets.dump(preset))
         for other in older:

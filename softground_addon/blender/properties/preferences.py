@@ -8,7 +8,8 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...core.ground import presets
-from ..settings import ADD_ON, user_folder
+from ..ground_presets import user_folder
+from ..settings import ADD_ON
 
 
 def _names(_preferences: bpy.types.AddonPreferences, _context: bpy.types.Context, _typed: str) -> list[str]:

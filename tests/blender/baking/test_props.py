@@ -7,12 +7,9 @@ from mathutils import Quaternion
 
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.character_setup import (
-    add_bone_contacts,
-    add_character,
-    add_object_contacts,
-    add_props,
-)
+from softground_addon.blender.characters.character_setup import add_character
+from softground_addon.blender.characters.contact_editing import add_bone_contacts, add_object_contacts
+from softground_addon.blender.characters.prop_setup import add_props
 from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.reading.shots import read_shot, settings_of

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs, setting_paths, settings
+from softground_addon.blender import ground_presets, jobs, setting_paths, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import painted_ground
 from softground_addon.blender.properties import material
@@ -52,10 +52,10 @@ def test_every_field_of_the_material_is_a_setting_with_a_tooltip_and_off_beyond_
 
 
 def test_a_preset_with_options_sets_them_and_the_next_one_takes_them_back(scene):
-    settings.apply_preset(scene.softground, find("loose_dry_sand"))
+    ground_presets.apply_preset(scene.softground, find("loose_dry_sand"))
     assert scene.softground.material.repose_angle == pytest.approx(np.radians(32.0), abs=1e-4)
     assert settings.material_of(scene.softground) == find("loose_dry_sand").material
-    settings.apply_preset(scene.softground, find("snow"))
+    ground_presets.apply_preset(scene.softground, find("snow"))
     assert settings.material_of(scene.softground) == find("snow").material
 
 
@@ -74,7 +74,7 @@ def test_options_are_assigned_by_their_path(scene):
 
 @pytest.mark.slow
 def test_sand_with_an_angle_of_repose_bakes_within_its_checks_and_leaves_no_steeper_wall(walk):
-    settings.apply_preset(walk.softground, find("loose_dry_sand"))
+    ground_presets.apply_preset(walk.softground, find("loose_dry_sand"))
     walk.softground.ground = plane(walk, vertices=560, size=5.6)  # a vertex on every cell of 1 cm
     bake(walk)
     ground = walk.softground.ground
@@ -142,7 +142,7 @@ def test_a_vertex_group_scales_its_members_only(walk):
 
 
 def test_a_painted_rim_passes_the_check_of_volumes(walk):
-    settings.apply_preset(walk.softground, find("mud"))
+    ground_presets.apply_preset(walk.softground, find("mud"))
     ground = walk.softground.ground = plane(walk)
     paint(ground, "softground_rim_factor", np.where(place(ground)[:, 0] > 0, 0.0, 3.0))
     totals = bake(walk).report["totals"]
@@ -204,7 +204,7 @@ def test_what_can_be_painted_is_offered_and_what_is_not_there_yet_is_told_apart(
 def test_hand_hardness_reads_the_snow_and_sets_stiffness_and_layer(scene):
     options = scene.softground
     for preset, hardness in (("powder", 1.12), ("settled_snow", 2.16), ("piste", 4.8)):
-        settings.apply_preset(scene.softground, find(preset))
+        ground_presets.apply_preset(scene.softground, find(preset))
         assert options.hand_hardness == pytest.approx(hardness, abs=0.02)
     rim = options.material.rim_reach
     options.hand_hardness = 2.16
@@ -217,7 +217,7 @@ def test_hand_hardness_reads_the_snow_and_sets_stiffness_and_layer(scene):
 def test_moisture_reads_the_sand_and_sets_how_firm_it_is(scene):
     options = scene.softground
     for preset, moisture in (("dune", 0.0), ("wet_beach", 0.3), ("firm_wet_sand", 0.6), ("soaked_sand", 1.0)):
-        settings.apply_preset(scene.softground, find(preset))
+        ground_presets.apply_preset(scene.softground, find(preset))
         assert options.moisture == pytest.approx(moisture, abs=0.03)
     options.moisture = 0.6
     assert options.material.youngs_modulus == pytest.approx(2040e3, rel=0.05)

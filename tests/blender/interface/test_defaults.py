@@ -11,9 +11,9 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from softground_addon.blender import jobs, settings
+from softground_addon.blender import ground_presets, jobs, settings
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters import character_setup
+from softground_addon.blender.characters import prop_setup
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.playback import own_data
@@ -120,7 +120,7 @@ def test_cells_fit_the_shortest_sole_and_things_have_a_centimetre_at_most(scene,
     assert options.cell_size == pytest.approx(0.55 / 55 / COARSER, rel=0.02)
     options.characters.clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=4.0)
-    character_setup.add_props(scene, [bpy.context.active_object])
+    prop_setup.add_props(scene, [bpy.context.active_object])
     assert options.cell_size == pytest.approx(0.01)
 
 
@@ -130,14 +130,14 @@ def test_lengths_of_a_preset_fit_small_soles_unless_they_are_set(scene, walker):
     material = options.material
     walker.scale = (0.1, 0.1, 0.1)
     bpy.ops.softground.add_character()
-    small = options.characters[0].sole_length / settings.SMALL_SOLE
+    small = options.characters[0].sole_length / ground_presets.SMALL_SOLE
     assert small < 0.4
     for preset in (snow, mud, snow):
-        settings.apply_preset(scene.softground, preset)
+        ground_presets.apply_preset(scene.softground, preset)
         assert material.rim_reach == pytest.approx(small * preset.material.rim_reach)
         assert material.blur_sigma == pytest.approx(small * preset.material.blur_sigma)
-        assert settings.holds(scene.softground, preset)
-        said = settings.as_preset(scene.softground, "again").material
+        assert ground_presets.holds(scene.softground, preset)
+        said = ground_presets.as_preset(scene.softground, "again").material
         assert said == preset.material
     material.rim_reach = 0.02
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.005)
@@ -150,19 +150,19 @@ def test_lengths_of_a_preset_fit_small_soles_unless_they_are_set(scene, walker):
 def test_lengths_of_a_preset_are_those_of_a_persons_soles(scene, walker):
     bpy.ops.softground.add_character()
     assert scene.softground.length_scale == 1.0
-    assert settings.holds(scene.softground, presets.find("snow"))
+    assert ground_presets.holds(scene.softground, presets.find("snow"))
 
 
 def test_leaving_add_character_leaves_the_ground_as_it_was(scene, walker):
     before = settings.snapshot(scene)
-    unset = settings.untouched(scene.softground)
+    unset = ground_presets.untouched(scene.softground)
     job = operators._added(scene, walker, [walker])
     while not scene.softground.characters:
         next(job)
     assert settings.snapshot(scene) != before
     job.close()
     assert settings.snapshot(scene) == before
-    assert settings.untouched(scene.softground) == unset
+    assert ground_presets.untouched(scene.softground) == unset
 
 
 def test_shoes_have_a_tread_and_what_rolls_has_none(scene, walker):

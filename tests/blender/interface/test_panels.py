@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs, registration, session, settings
+from softground_addon.blender import ground_presets, jobs, registration, session, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.operators import bake_result, modal_bake, prediction
 from softground_addon.blender.panels import (
@@ -369,7 +369,7 @@ def test_names_that_differ_have_files_of_their_own(shot, user_folder):
 def test_presets_whose_files_were_named_otherwise_are_the_users_too(shot, user_folder):
     user_folder.mkdir(parents=True, exist_ok=True)
     file = user_folder / "deep__snow_.json"
-    file.write_text(presets.dump(settings.as_preset(shot.softground, "Deep  Snow!")))
+    file.write_text(presets.dump(ground_presets.as_preset(shot.softground, "Deep  Snow!")))
     with pytest.raises(RuntimeError, match=r"You have a preset like 'Deep Snow' \(deep__snow_\.json\)"):
         bpy.ops.softground.save_preset(name="Deep Snow")
 
@@ -388,14 +388,14 @@ def test_scenes_start_with_the_preset_of_the_preferences(scene, user_folder, mon
     try:
         ours.module = settings.ADD_ON
         ours.preferences.default_preset = "Mud"
-        assert settings.default_preset().name == "Snow"  # in background, on every machine alike
+        assert ground_presets.default_preset().name == "Snow"  # in background, on every machine alike
         monkeypatch.setattr(settings, "_preferred", lambda: ours.preferences.default_preset)
         assert preset_menu.title_of_ground(scene.softground) == "Mud"
         walker(scene, frames=24)
         bpy.ops.softground.add_character()
         assert (scene.softground.material.preset, scene.softground.material.surface) == ("Mud", "mud")
         ours.preferences.default_preset = "Gone"
-        assert settings.default_preset().name == "Snow"
+        assert ground_presets.default_preset().name == "Snow"
     finally:
         bpy.context.preferences.addons.remove(ours)
     assert "Mud" in presets.names()

@@ -3,7 +3,7 @@
 import bpy
 import pytest
 
-from softground_addon.blender import compat, handlers, jobs, settings
+from softground_addon.blender import compat, ground_presets, handlers, jobs
 from softground_addon.blender.live import live
 from softground_addon.blender.operators import prediction
 from softground_addon.blender.reading import analysis
@@ -187,7 +187,9 @@ def test_a_depth_that_is_typed_or_dragged_is_met_after_a_moment(shot, drawing, d
 
 
 def test_a_bake_ends_the_search_for_a_depth_that_was_typed(shot, drawing):
-    settings.apply_preset(shot.softground, presets.find("soft_mud"))  # where the depth is no share of the stiffness
+    ground_presets.apply_preset(
+        shot.softground, presets.find("soft_mud")
+    )  # where the depth is no share of the stiffness
     analysis.read(shot)
     drawing(shot)
     while prediction._work_out() is not None:

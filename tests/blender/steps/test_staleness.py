@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 from softground_addon.blender.baking import bake_report
-from softground_addon.blender.characters.character_setup import add_object_contacts
+from softground_addon.blender.characters.contact_editing import add_object_contacts
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import analysis, staleness
