@@ -18,10 +18,12 @@ LINT_READY := .venv-core/.ready-lint
 # One process for each processor, but no crowd of Blenders on a large machine. What measures time runs alone.
 SIDE_BY_SIDE := -n auto --maxprocesses 8 --dist worksteal
 
-# make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found.
+# make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found. SAMPLES=4 makes
+# its pictures sooner.
 MOTION ?=
 SCALE ?= 0.01
 UP ?=
+SAMPLES ?=
 
 .PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving film core test slow versions marathon bench validate validate-ground zoo sheets gui pictures package installed lint types architecture clean
 
@@ -42,7 +44,7 @@ $(LINT_READY): $(CORE_READY) requirements/lint.txt
 ready: $(READY)
 
 demo: $(READY)
-	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
+	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP)) $(if $(SAMPLES),--samples $(SAMPLES))
 
 # The scenes of docs/figures.md with their pictures, from nothing, into build/scenes.
 scenes: $(READY)
@@ -151,7 +153,7 @@ blenders:
 GUI := $(PYTEST) -rs tests/gui -k "$(subst $() , or ,$(strip $(BLENDERS)))"
 gui: $(READY) blenders
 	$(GUI) -m "gui and alone"
-	$(GUI) -m "gui and not alone" $(SIDE_BY_SIDE) --dist loadfile
+	$(GUI) -m "gui and not alone" $(SIDE_BY_SIDE) --dist loadfile --no-loadscope-reorder
 
 # The pictures in the docs, as the GUI tests took them in Blender 4.3.
 pictures: gui

@@ -33,6 +33,7 @@ STORY_SECONDS = 1200
 
 WINDOWS = {
     "pauses": (640, 480),
+    "buttons": (1100, 760),
     "live_answers": (1100, 760),
     "first_minutes": (1100, 760),
     "filmed": (880, 600),

@@ -132,6 +132,10 @@ class Hand:
         space.region_3d.view_rotation = Euler((1.05, 0.0, 0.9)).to_quaternion()
         yield 0.7
 
+    def show_wires(self) -> None:
+        """What a story without pictures looks at: without a graphics card, light takes seconds to draw."""
+        self.area().spaces.active.shading.type = "WIREFRAME"
+
     def show_materials(self, sun: tuple[float, float]) -> None:
         """Materials in the light of a low sun, as high and at such an angle about z [rad], and of little else."""
         light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))

@@ -13,7 +13,7 @@ def facts(tell):
 
 
 def test_all_buttons_with_a_job_are_pressed(facts):
-    by_others = ("add_step", "change_step", "drop_steps")  # at the cursor, in a dialog, by the mouse
+    by_others = ("add_step", "change_step", "drop_steps", "live")  # each has a story
     assert facts["all"] == sorted((*ON_THE_SPOT, *READING, *BAKING, *EDITING, *by_others, "root_motion"))
     assert {name: ends for name, ends in facts["pressed"].items() if any(ends)} == {}
 

@@ -22,6 +22,7 @@ EDITING = ("mute_step", "duplicate_step", "reset_step", "reset_steps", "add_weat
 def tell(hand: Hand, facts: dict) -> Steps:
     facts["all"] = sorted(with_a_job(module("operators.modal_job").ModalJob))
     facts["pressed"] = {}
+    hand.show_wires()
     armature = open_walk(60, 24)
     write_action(armature, on_the_spot(), "On the Spot")
     scene().softground.cell_size = 0.02

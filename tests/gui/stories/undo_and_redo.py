@@ -20,6 +20,7 @@ Deed = Callable[[], object]
 
 
 def tell(hand: Hand, facts: dict) -> Steps:
+    hand.show_wires()
     facts["sessions"] = []
     for seed in range(SESSIONS):
         told: dict[str, Any] = {"deeds": [], "undone": {}, "redone": {}}
