@@ -22,7 +22,7 @@ def make(blend: str, heights: str) -> None:
     import softground_addon
     from softground_addon.blender import jobs
     from softground_addon.blender.baking import bake_job
-    from softground_addon.blender.ground import baked_ground, ground_mesh
+    from softground_addon.blender.ground import baked_ground, ground_surface
     from softground_addon.core.record.pressed_ground import PressedGround
     from tests.blender import shots
     from tests.blender.grounds import plane
@@ -41,7 +41,7 @@ def make(blend: str, heights: str) -> None:
         set_up_render(scene)
         display_mesh = baked_ground.display_mesh_of(ground)
         display_mesh.name = "Carrier"
-        rest = ground_mesh.rest_vertices(display_mesh, 1.0)
+        rest = ground_surface.rest_vertices(display_mesh, 1.0)
         footprints, about = baked_ground.load(ground)
         sigma = baked_ground.baked_with(about, "blur_sigma")
         recorded = {}

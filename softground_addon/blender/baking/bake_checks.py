@@ -17,7 +17,7 @@ from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings
 from .. import settings
-from ..ground import ground_mesh
+from ..ground import ground_surface
 from ..rigs.frame_ranges import holds_a_pose
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
     vertices_in_cells = among(printed, first[:, None] + (0, 1, ROW, ROW + 1)).any(axis=1).sum()
     spacing = float(np.sqrt(len(cells) * cell_size**2 / max(1e-9, float(vertices_in_cells))))
     counted = []
-    for part in ground_mesh.parts_of(vertices):
+    for part in ground_surface.parts_of(vertices):
         yield
         counted.append(np.unique(keys_at(part[:, :2], DETAIL_FROM * cell_size), return_counts=True))
     yield

@@ -35,7 +35,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.settings import Acts, BakeSettings
 from .. import settings
-from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, counted, meanwhile
@@ -261,7 +261,7 @@ def _given(
     drafts: ExitStack,
     wanted: BakeSettings,
     shot: Shot,
-    surface: ground_mesh.GroundSurface,
+    surface: ground_surface.GroundSurface,
     trail: Trail,
     sole_length: float,
 ) -> Job[tuple[baked_ground.Place, list[Finding]]]:
@@ -270,7 +270,7 @@ def _given(
     name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
-        Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.2), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
@@ -289,7 +289,7 @@ def _given(
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
-        Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.4), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

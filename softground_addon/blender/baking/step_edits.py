@@ -23,7 +23,7 @@ from ...core.settings import Acts, BakeSettings
 from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh, painted_ground
+from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
 from . import bake_job, bake_report
@@ -76,10 +76,10 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     left = baked_ground.record_of(ground)
     made_with = _made_with(scene, left)
     names = painted_ground.names_of(ground, made_with.painted)
-    undisturbed = ground_mesh.undisturbed_surface.slices(ground, made_with.unit_scale_m, names)
+    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names)
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
     low, high = _extent(left)
-    looking = ground_mesh.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
+    looking = ground_surface.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
     terrain = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), looking)
     shot = Shot((), low, high, None, surface, terrain)
     return EditableBake(

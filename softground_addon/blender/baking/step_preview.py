@@ -14,7 +14,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from .. import session, settings
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import display_key, playback
 from .publish import at_the_end
 from .step_edits import EditableBake
@@ -38,9 +38,9 @@ class StepPreview:
         shown = baked_ground.display_mesh_of(ground)
         self._bake, self._name = bake, settings.name_of(shown)
         unit_scale = bake.made_with.unit_scale_m
-        place = ground_mesh.rest_vertices(shown, unit_scale)
+        place = ground_surface.rest_vertices(shown, unit_scale)
         self._x, self._y = np.ascontiguousarray(place.T[:2])  # axis by axis: looked through at each move
-        self._up = ground_mesh.up_of(shown, unit_scale)
+        self._up = ground_surface.up_of(shown, unit_scale)
         self._before = ground_mesh.displayed_positions(shown)
         self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
         self._changed: list[Window] = []

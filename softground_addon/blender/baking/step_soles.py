@@ -14,7 +14,7 @@ from ...core.record.mesh_sole import LONGEST, SHORTEST, MeshSole
 from ...core.settings import BakeSettings
 from ...core.soles.soles import sole_from_underside
 from .. import mesh_arrays, settings
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, ground_surface
 
 _FROM_SCENE = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """World axes to those of a sole: its toes point along -Y, as a character faces in front view."""
@@ -78,7 +78,7 @@ def read(obj: bpy.types.Object, ground: bpy.types.Object | None, unit_scale: flo
         raise InputError(f"'{name}' is the ground and cannot print on itself: choose another object for the sole.")
     if obj.mode == "EDIT":
         raise InputError(f"'{name}', which is to press steps, is in Edit Mode: leave it with Tab first.")
-    with ground_mesh.stand_in(obj, ground_mesh.mesh_of(obj)) as evaluated:
+    with ground_surface.stand_in(obj, ground_mesh.mesh_of(obj)) as evaluated:
         mesh = evaluated.to_mesh()
         try:
             vertices, triangles = mesh_arrays.positions(mesh).astype(float), mesh_arrays.triangles(mesh)

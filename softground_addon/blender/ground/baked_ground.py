@@ -25,7 +25,7 @@ from ..debris import debris_object
 from ..jobs import Job, Progress
 from ..playback import own_data, playback
 from ..settings import exists, found, name_of
-from . import created_ground, ground_checks, ground_mesh, hidden_ground, trail_detail
+from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -171,9 +171,9 @@ def write(
     found(table)  # or nothing is written
     ground_checks.check_playable(found(place.display_mesh))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
-    up = ground_mesh.up_of(found(place.display_mesh), unit_scale)
+    up = ground_surface.up_of(found(place.display_mesh), unit_scale)
     with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
-        ground_mesh.write(found(place.display_mesh), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+        ground_mesh.write(found(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.9)
         display_mesh = found(place.display_mesh)

@@ -1,4 +1,4 @@
-"""The ground as a mesh: its undisturbed surface in, the pressed ground out, and back to what it was.
+"""The mesh of the ground: pressed heights, shading and record on it, and back to what it was.
 
 While a bake is on a ground, its mesh carries: the undisturbed positions (attribute `softground_rest`), the raw heights
 (shape key Basis), the blurred heights (shape key `SoftGround Display`), the shading attributes, and the record of
@@ -8,94 +8,24 @@ footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, cast
+from collections.abc import Sequence
+from typing import cast
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core.errors import InputError
-from ...core.ground.heightfield import Terrain
-from ...core.ground.terrain import MeshTerrain
-from ...core.numerics.slices import Slices, sliced
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
 from .. import mesh_arrays
-from ..compat import remove_scene
 from ..playback import display_key, own_data, playback, weather_modifier
 from ..playback.own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
-from . import painted_ground
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 SHOWN = ("steps", "max_depth_m", "typical_depth_m", "peak_force_n")
 """Numbers that every summary has."""
-
-_BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
-"""Ways in which an object hangs on a part of its parent, which may lie elsewhere than the parent."""
-
-ON_SURFACE = 2e-3
-"""Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
-
-
-@dataclass(frozen=True)
-class GroundSurface:
-    """The undisturbed ground in world space.
-
-    Attributes
-    ----------
-    name : str
-        Of the object.
-    vertices : (V, 3) float array
-        World positions of the vertices that the bake moves [m].
-    surface_vertices : (W, 3) float array
-        World positions of the evaluated surface [m]: the same, unless modifiers add vertices.
-    triangles : (T, 3) int array
-        Triangles of the evaluated surface.
-    factors : (W, 3) float array, optional
-        What is painted on the evaluated surface; see `painted_ground`.
-    """
-
-    name: str
-    vertices: Array
-    surface_vertices: Array
-    triangles: Indices
-    factors: Array | None = None
-
-
-@sliced
-def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
-    """A ground's surface as a function of place, within bounds in the plane [m]."""
-    mesh, name = (surface.surface_vertices, surface.triangles), f"Ground '{surface.name}'"
-    return (yield from MeshTerrain.from_mesh.slices(*mesh, bounds, surface.factors, name=name))
-
-
-AT_ONCE = 1 << 17
-"""Vertices that are looked at together: of a large ground in a hundredth of a second."""
-
-
-def parts_of(vertices: Array) -> list[Array]:
-    """Vertices (V, 3) in parts that are looked at together; at least one."""
-    return np.split(vertices, range(AT_ONCE, len(vertices), AT_ONCE))
-
-
-@sliced
-def pressed_vertices(
-    vertices: Array, covers: Callable[[Array, Array], NDArray[np.bool_]], terrain: Terrain
-) -> Slices[Indices]:
-    """Which of the vertices (V, 3) lie on top of the surface at places (x, y) that are covered, (K,)."""
-    pressed = []
-    for number, part in enumerate(parts_of(vertices)):
-        near = np.flatnonzero(covers(part[:, 0], part[:, 1]))
-        yield
-        x, y, z = part[near].T
-        pressed.append(number * AT_ONCE + near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE])
-    return np.concatenate(pressed)
 
 
 def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
@@ -137,154 +67,12 @@ def warnings_of(ground: bpy.types.Object) -> list[str]:
     return str(mesh_of(ground).get(WARNINGS, "")).splitlines() if ground.type == "MESH" else []
 
 
-def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """World positions of the mesh's vertices without any bake or modifier, (V, 3) [m].
-
-    Raises
-    ------
-    InputError
-        If some are no numbers.
-    """
-    vertices = _transform(to_world_of(ground, unit_scale), rest_positions(mesh_of(ground)))
-    if not np.isfinite(vertices).all():
-        raise InputError(f"Ground '{ground.name}' has vertices without a valid position (NaN): delete them first.")
-    return vertices
-
-
-@sliced
-def undisturbed_surface(
-    ground: bpy.types.Object, unit_scale: float, painted: painted_ground.Names = ()
-) -> Slices[GroundSurface]:
-    """The ground as it is without any bake, in world space and metres, with what is painted on it.
-
-    Blender is asked for nothing after the first slice.
-
-    Raises
-    ------
-    InputError
-        If the surface has points that are no numbers.
-    """
-    mesh, name = mesh_of(ground), ground.name
-    vertices = rest_vertices(ground, unit_scale)
-    to_world = to_world_of(ground, unit_scale)
-    if not any(modifier.show_viewport for modifier in ground.modifiers):
-        surface, faces = vertices, mesh_arrays.read_faces(mesh)
-        factors = painted_ground.factors(ground, mesh, painted)
-    else:
-        with undisturbed_copy(ground) as evaluated:
-            faces = mesh_arrays.read_faces(evaluated)
-            surface = _transform(to_world, faces.positions)
-            factors = painted_ground.factors(ground, evaluated, painted)
-        if len(surface) == len(vertices):
-            vertices = surface
-    yield
-    triangles = yield from mesh_arrays.triangle_vertices.slices(faces)
-    if np.linalg.det(to_world[:3, :3]) < 0:
-        triangles = triangles[:, ::-1]
-    return GroundSurface(name, vertices, surface, triangles, factors)
-
-
-def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """Object space to world space in metres, (4, 4), whether the ground is visible or not."""
-    placed = ground.matrix_world if ground.visible_get() else placed_by_parents(ground)
-    if placed is None:
-        with stand_in(ground) as evaluated:
-            placed = evaluated.matrix_world.copy()
-    matrix = np.array(placed, dtype=np.float64)
-    matrix[:3] *= unit_scale
-    return matrix
-
-
-def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
-    """Object space to world space by an object's own values and those of its parents, hidden or not.
-
-    Blender keeps no world matrix of what is hidden. None where constraints, physics, bones or vertices have a say in
-    it: only Blender can tell then, by evaluating the object in a scene that shows it.
-    """
-    parent, body = obj.parent, obj.rigid_body
-    if any(not constraint.mute for constraint in obj.constraints) or (body and body.type == "ACTIVE"):
-        return None
-    if parent is None:
-        return obj.matrix_basis
-    if obj.parent_type in _BY_PARTS or (parent.type == "CURVE" and parent.data.use_path):
-        return None
-    above = placed_by_parents(parent)
-    return None if above is None else above @ obj.matrix_parent_inverse @ obj.matrix_basis
-
-
-@contextmanager
-def stand_in(
-    ground: bpy.types.Object,
-    mesh: bpy.types.Mesh | None = None,
-    *,
-    weather_at: int | None = None,
-    weather: bpy.types.NodeTree | None = None,
-    with_users: bool = True,
-) -> Iterator[bpy.types.Object]:
-    """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
-
-    Modifiers that change over time are evaluated at the first frame of the bake, or at one at which the copy is to be
-    under weather, its own or another group's. Those of the user may be left out.
-    """
-    scene = bpy.data.scenes.new("SoftGround Evaluation")
-    for shown_in in ground.users_scene[:1]:
-        scene.frame_current, render = shown_in.softground.frame_start, shown_in.render
-        scene.render.frame_map_old, scene.render.frame_map_new = render.frame_map_old, render.frame_map_new
-    if weather_at is not None:
-        scene.frame_current = weather_at
-    copy = ground.copy()
-    try:
-        copy.hide_viewport = False
-        if mesh is None:
-            copy.modifiers.clear()
-        else:
-            copy.data = mesh
-            its_weather: Any = weather_modifier.modifier_of(copy)
-            if weather is not None:
-                its_weather.node_group = weather
-            users = [] if with_users else users_modifiers(copy)
-            for unwanted in (playback.modifier_of(copy), its_weather if weather_at is None else None, *users):
-                if unwanted:
-                    copy.modifiers.remove(unwanted)
-        scene.collection.objects.link(copy)
-        layer = scene.view_layers[0]
-        layer.update()
-        yield copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph))
-    finally:
-        bpy.data.objects.remove(copy)
-        remove_scene(scene)
-
-
-@contextmanager
-def undisturbed_copy(
-    ground: bpy.types.Object, moved: Indices | None = None, by: Array | None = None
-) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake.
-
-    Vertices of its mesh (K,) may be moved, by as much (3,) in its own space and units.
-    """
-    mesh = mesh_of(ground).copy()
-    try:
-        rest = rest_positions(mesh)
-        if moved is not None:
-            rest[moved] += np.asarray(by, dtype=np.float32)
-        display_key.drop_all(mesh)
-        write_positions(mesh, rest)
-        if any(modifier.show_viewport for modifier in users_modifiers(ground)):
-            with stand_in(ground, mesh) as evaluated:
-                yield mesh_of(evaluated)
-        else:
-            yield mesh
-    finally:
-        bpy.data.meshes.remove(mesh)
-
-
 def write(
     ground: bpy.types.Object,
     index: Indices,
     pressed: GroundSample,
     record: bytes,
-    unit_scale: float,
+    up: Array,
     *,
     shape_keys: bool = True,
 ) -> None:
@@ -302,8 +90,8 @@ def write(
         What it does to each of them.
     record : bytes
         The footprints, from `core.record.record`.
-    unit_scale : float
-        Metres per Blender unit.
+    up : (3,) float array
+        One metre upward in the ground's own space and units: `ground_surface.up_of`.
     shape_keys : bool
         Blender evaluates shape keys on the whole mesh at each frame that is played, which a dense ground feels.
     """
@@ -311,7 +99,6 @@ def write(
     rest = rest_positions(mesh)
     rest_attribute = own_data.attribute(mesh, REST, "FLOAT_VECTOR")
     rest_attribute.data.foreach_set("vector", rest.ravel())
-    up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
     raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
     display[index] += (pressed.display[:, None] * up).astype(np.float32)
@@ -345,12 +132,6 @@ def write_shading(ground: bpy.types.Object, name: str, index: Indices, values: A
     whole[index] = values
     kind, field = ("FLOAT", "value") if values.ndim == 1 else ("FLOAT_VECTOR", "vector")
     own_data.attribute(mesh, name, kind).data.foreach_set(field, whole.ravel())
-
-
-def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """World up in the ground's own space and units, of the length of one metre, (3,)."""
-    up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
-    return up
 
 
 def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
@@ -424,7 +205,3 @@ def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> Non
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
     mesh.update()
-
-
-def _transform(matrix: Array, points: NDArray[np.float32]) -> Array:
-    return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -8,7 +8,7 @@ from typing import Any, cast
 import bpy
 
 from ..animation_layer.animated_paths import animated_paths
-from . import ground_mesh
+from . import ground_mesh, ground_surface
 
 WAS_HIDDEN = "softground_was_hidden"
 """Property of the ground while it is hidden: what of `_SHOWN` was set before."""
@@ -60,7 +60,7 @@ def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
         return True
     if not any(modifier.type == "NODES" and modifier.name in shown for modifier in ground.modifiers):
         return False
-    with ground_mesh.stand_in(ground, ground_mesh.mesh_of(ground)) as evaluated:
+    with ground_surface.stand_in(ground, ground_mesh.mesh_of(ground)) as evaluated:
         copy = evaluated.original
         for modifier in copy.modifiers:
             modifier.show_viewport = modifier.name in shown

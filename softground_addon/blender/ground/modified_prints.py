@@ -12,7 +12,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from .. import mesh_arrays
 from ..playback import playback
-from . import ground_mesh
+from . import ground_mesh, ground_surface
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -60,8 +60,8 @@ def are_undone(
         return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
         return False
-    to_world = ground_mesh.to_world_of(ground, unit_scale)
-    with ground_mesh.undisturbed_copy(ground, moved, LIFT * ground_mesh.up_of(ground, unit_scale)) as raised:
+    to_world = ground_surface.to_world_of(ground, unit_scale)
+    with ground_surface.undisturbed_copy(ground, moved, LIFT * ground_surface.up_of(ground, unit_scale)) as raised:
         surface = mesh_arrays.positions(raised) @ to_world[:3, :3].T + to_world[:3, 3]
         triangles = mesh_arrays.triangles(raised)
     if np.linalg.det(to_world[:3, :3]) < 0:

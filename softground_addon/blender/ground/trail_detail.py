@@ -21,7 +21,7 @@ from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import playback
 from ..settings import exists, find, name_of
-from . import ground_mesh, refined_mesh
+from . import ground_mesh, ground_surface, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
 
 DETAIL = "softground_detail"
@@ -56,8 +56,8 @@ def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
 @sliced
 def surface_of(ground: bpy.types.Object, unit_scale: float) -> Slices[Surface]:
     """The faces of the ground as its modifiers leave it, in world space [m]; all is read in the first slice."""
-    with ground_mesh.undisturbed_copy(ground) as source:
-        faces, to_world = mesh_arrays.read_faces(source), ground_mesh.to_world_of(ground, unit_scale)
+    with ground_surface.undisturbed_copy(ground) as source:
+        faces, to_world = mesh_arrays.read_faces(source), ground_surface.to_world_of(ground, unit_scale)
     yield
     return (yield from refined_mesh.surface_of.slices(faces, to_world))
 
@@ -78,7 +78,7 @@ def draft(drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinem
         )
     with none_left_if_it_fails():
         mesh = bpy.data.meshes.new(f"{ground.name} Trail")
-        with ground_mesh.undisturbed_copy(ground) as source:
+        with ground_surface.undisturbed_copy(ground) as source:
             for material in source.materials:
                 mesh.materials.append(material and material.original)  # an evaluated mesh holds evaluated materials
             carried = refined_mesh.read(source, [group.name for group in ground.vertex_groups])

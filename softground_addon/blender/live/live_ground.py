@@ -20,7 +20,7 @@ from ...core.record import record
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
 from .. import settings
-from ..ground import ground_mesh
+from ..ground import ground_mesh, ground_surface
 from ..ground.baked_ground import Place
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ class LiveGround:
         ground = settings.found(place.display_mesh)
         self._name = place.display_mesh
         self._vertices, self._place = place.index, place.position[:, :2]
-        self._up = ground_mesh.up_of(ground, unit_scale)
+        self._up = ground_surface.up_of(ground, unit_scale)
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
@@ -92,7 +92,7 @@ class LiveGround:
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
         empty, ground = np.empty(0, np.intp), settings.found(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        ground_mesh.write(ground, empty, nothing, no_prints, unit_scale, shape_keys=False)
+        ground_mesh.write(ground, empty, nothing, no_prints, ground_surface.up_of(ground, unit_scale), shape_keys=False)
         shown = place.publish()
         self._name = settings.name_of(shown)
         return shown

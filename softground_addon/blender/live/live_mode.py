@@ -27,7 +27,7 @@ from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report
 from ..baking.publish import at_the_end, publish, sign, with_debris
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_surface
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of
 from .live_ground import LiveGround
@@ -266,10 +266,10 @@ class LiveMode:
         movers, name = staleness.of_movers(scene, made_with), settings.name_of(ground)
         footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
         yield now
-        vertices = ground_mesh.rest_vertices(settings.found(name), made_with.unit_scale_m)
+        vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
         shown = yield from jobs.meanwhile(now, pressing)
-        looking = ground_mesh.pressed_vertices.slices(vertices, shown.covers, shot.terrain)
+        looking = ground_surface.pressed_vertices.slices(vertices, shown.covers, shot.terrain)
         index = yield from jobs.meanwhile(now, looking)
         place = baked_ground.on_itself(settings.found(name), index, vertices)
         baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})

@@ -18,7 +18,7 @@ from ...core.numerics.cell_keys import among, cells_at, keys_at
 from ...core.settings import BakeSettings
 from .. import settings
 from ..baking.bake_checks import coverage, wants_detail
-from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.modified_prints import are_undone
 from ..jobs import Job, Progress, meanwhile
 from ..reading import analysis
@@ -79,13 +79,13 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
     if wanted.ground is None:
         assert shot.plan is not None
         name, layout = yield from meanwhile(PLACING, created_ground.created(drafts, wanted, shot.plan))
-        looking = ground_mesh.pressed_vertices.slices(layout.vertices, is_near, shot.terrain)
+        looking = ground_surface.pressed_vertices.slices(layout.vertices, is_near, shot.terrain)
         index = yield from meanwhile(PLACING, looking)
         return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 
     name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
     if vertices is None:  # it was made for the shot
-        vertices = ground_mesh.rest_vertices(settings.found(name), unit_scale)
+        vertices = ground_surface.rest_vertices(settings.found(name), unit_scale)
     plan = shot.plan or (yield from meanwhile(PLACING, plan_ground.slices(shot.motions)))
     if plan.footfalls is not None:
         footfalls = cells_at(plan.footfalls, cell_size)
@@ -96,7 +96,7 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
         def is_under(x: Array, y: Array) -> Mask:
             return among(footfalls, keys_at(np.stack([x, y], axis=-1), cell_size))
 
-        under = yield from meanwhile(PLACING, ground_mesh.pressed_vertices.slices(vertices, is_under, shot.terrain))
+        under = yield from meanwhile(PLACING, ground_surface.pressed_vertices.slices(vertices, is_under, shot.terrain))
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
             ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
         ):
@@ -106,9 +106,9 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
             drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
             drafted = yield from meanwhile(PLACING, drafting)
             vertices = refinement.at_vertices(coarse, coarse.vertices)
-            looking = ground_mesh.pressed_vertices.slices(vertices, is_near, shot.terrain)
+            looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
             index = yield from meanwhile(PLACING, looking)
             return baked_ground.on_detail(settings.found(name), settings.found(drafted), index, vertices)
-    looking = ground_mesh.pressed_vertices.slices(vertices, is_near, shot.terrain)
+    looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
     index = yield from meanwhile(PLACING, looking)
     return baked_ground.on_itself(settings.found(name), index, vertices)

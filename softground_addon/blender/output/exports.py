@@ -19,7 +19,7 @@ from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import display_key, own_data, playback, weather_modifier
 from . import debris_points
 
@@ -39,13 +39,13 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     display_mesh = baked_display_mesh(ground)
     rest = ground_mesh.rest_positions(ground_mesh.mesh_of(display_mesh))
     moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
-    world = ground_mesh.rest_vertices(display_mesh, unit_scale)[moved]
+    world = ground_surface.rest_vertices(display_mesh, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     x, y = world[:, :2].T
     relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
     over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
-    up = ground_mesh.up_of(display_mesh, unit_scale)
+    up = ground_surface.up_of(display_mesh, unit_scale)
 
     def samples() -> Iterator[NDArray[np.float32]]:
         for frame in range(start, end + 1):
@@ -149,7 +149,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     weather = weather_modifier.modifier_of(display_mesh)
     last = _last_frame(scene, ground) if weather and weather.show_viewport else None
     if last is not None or any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
-        with ground_mesh.stand_in(display_mesh, mesh, weather_at=last) as evaluated:
+        with ground_surface.stand_in(display_mesh, mesh, weather_at=last) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
         mesh.name = plain.name
         bpy.data.meshes.remove(plain)
@@ -158,7 +158,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
     for key in own_data.PROPERTIES:
         mesh.pop(key, None)
-    still.matrix_world = Matrix(ground_mesh.to_world_of(display_mesh, 1.0).tolist())
+    still.matrix_world = Matrix(ground_surface.to_world_of(display_mesh, 1.0).tolist())
     scene.collection.objects.link(still)
     return still
 

@@ -22,7 +22,7 @@ from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
 from .. import mesh_arrays, settings
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh, refined_mesh
+from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
 from .exports import baked_display_mesh, written_by_blender
 
@@ -177,13 +177,13 @@ def _pixels(
     uv_map: str,
 ) -> Pixels:
     """The pixels of the ground's UV map that lie near footprints, with their places."""
-    with ground_mesh.undisturbed_copy(ground) as mesh:
+    with ground_surface.undisturbed_copy(ground) as mesh:
         layers = mesh.uv_layers
         layer = layers.get(uv_map) if uv_map else next((each for each in layers if each.active_render), None)
         if layer is None:
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
-        to_world = ground_mesh.to_world_of(ground, scene.unit_settings.scale_length)
+        to_world = ground_surface.to_world_of(ground, scene.unit_settings.scale_length)
         surface = refined_mesh.surface_of(mesh_arrays.read_faces(mesh), to_world)
         name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)

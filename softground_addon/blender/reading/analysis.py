@@ -31,7 +31,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
-from ..ground import ground_mesh
+from ..ground import ground_surface
 from ..state import state
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
@@ -252,7 +252,7 @@ def _source(scene: bpy.types.Scene, wanted: BakeSettings) -> _Source:
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
     """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers."""
-    return [tuple(row) for row in ground_mesh.placed_by_parents(ground) or ground.matrix_world]
+    return [tuple(row) for row in ground_surface.placed_by_parents(ground) or ground.matrix_world]
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:

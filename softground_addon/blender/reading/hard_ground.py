@@ -19,7 +19,7 @@ from ...core.motion.motion import CharacterMotion
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from .. import settings
-from ..ground import ground_checks, ground_mesh
+from ..ground import ground_checks, ground_surface
 from ..ground.baked_ground import display_mesh_of
 from . import staleness
 
@@ -64,10 +64,10 @@ def _tops(
     """The upper sides of objects within bounds in the plane, of those that have any."""
     tops = []
     for name in names:
-        surface = ground_mesh.undisturbed_surface(settings.found(name), unit_scale)
+        surface = ground_surface.undisturbed_surface(settings.found(name), unit_scale)
         yield
         with suppress(InputError):  # nobody walks there
-            tops.append((name, (yield from ground_mesh.terrain_of.slices(surface, bounds))))
+            tops.append((name, (yield from ground_surface.terrain_of.slices(surface, bounds))))
     return tops
 
 

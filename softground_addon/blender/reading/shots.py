@@ -28,8 +28,8 @@ from ...core.weather.felt_weather import weathering_of
 from .. import setting_paths, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
 from ..characters.import_fixes import size_of
-from ..ground import ground_checks, ground_mesh, painted_ground
-from ..ground.ground_mesh import GroundSurface
+from ..ground import ground_checks, ground_surface, painted_ground
+from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..response.character_keys import ReadRig, controls_of
 from ..rigs.rig_mapping import require_armature
@@ -142,13 +142,13 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
-    looking = ground_mesh.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted)
+    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted)
     surface = yield from meanwhile(Progress("sample", 1.0), looking)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
-    soft = yield from meanwhile(Progress("sample", 1.0), ground_mesh.terrain_of.slices(surface, bounds))
+    soft = yield from meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
     terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
 

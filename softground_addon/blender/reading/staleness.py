@@ -16,7 +16,7 @@ from ...core.files import report
 from ...core.settings import Acts, BakeSettings, CharacterSettings
 from .. import settings
 from ..compat import SERIES
-from ..ground import baked_ground, ground_mesh, painted_ground
+from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..ground.baked_ground import display_mesh_of
 from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
@@ -174,7 +174,7 @@ def of_soles(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, str]:
 
 
 def _of_sole(obj: bpy.types.Object) -> str:
-    matrix = ground_mesh.placed_by_parents(obj)
+    matrix = ground_surface.placed_by_parents(obj)
     turned = np.round(np.array(obj.matrix_world if matrix is None else matrix)[:3, :3], 5) + 0.0
     modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
     return input_hashes.joined([_of_mesh(obj), *modifiers, f"{zlib.crc32(turned.tobytes()):08x}"])
@@ -216,7 +216,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 
 def _of_standing(ground: bpy.types.Object) -> str:
     """Where the ground is, told without having Blender evaluate anything: it calls the handlers, which ask this."""
-    matrix = ground_mesh.placed_by_parents(ground)
+    matrix = ground_surface.placed_by_parents(ground)
     if matrix is None:
         return f"{input_hashes.of_place([ground, *ancestors(ground)])}{_of_movement(ground, None)}"
     place = np.round(np.array(matrix, dtype=np.float64), 6) + 0.0  # no negative zeros

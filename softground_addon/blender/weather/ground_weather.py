@@ -20,7 +20,7 @@ from ...core.weather.felt_weather import felt_in
 from ...core.weather.weather import Matter, Span, matter_of, moment_of, span_of
 from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
 from .. import compat, jobs, settings
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import own_data, weather_inputs, weather_modifier, weather_table
 from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
@@ -149,7 +149,7 @@ def _fit(
         (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
-    up = ground_mesh.up_of(display_mesh, unit_scale)
+    up = ground_surface.up_of(display_mesh, unit_scale)
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
     mesh = ground_mesh.mesh_of(display_mesh)
@@ -198,10 +198,10 @@ def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mappin
     with damage_named(ground):
         (known, _), unit_scale = of_bake(footprints, about), baked_ground.units_of(about["inputs"])["unit_scale_m"]
     name = settings.name_of(display_mesh)
-    position = ground_mesh.undisturbed_surface(display_mesh, unit_scale).vertices
+    position = ground_surface.undisturbed_surface(display_mesh, unit_scale).vertices
     yield READING
     display_mesh = settings.found(name)
-    mesh, up = ground_mesh.mesh_of(display_mesh), ground_mesh.up_of(display_mesh, unit_scale)
+    mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale)
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
     relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)
     start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core.playback.keyframe_tables import keyframe_tables
 from ...core.playback.vertex_histories import VertexHistories
 from ...core.weather.weather_places import NOT_YET, SIGMAS, weather_places
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, ground_surface
 from ..mesh_arrays import positions
 from ..playback import own_data, weather_modifier, weather_table
 from ..playback import playback_nodes as played
@@ -100,7 +100,7 @@ def weathered_points(
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))
-        up = ground_mesh.up_of(display_mesh, unit_scale)
+        up = ground_surface.up_of(display_mesh, unit_scale)
 
         with _looking_up(modifier.node_group, hollows) as group:
 
@@ -108,7 +108,7 @@ def weathered_points(
                 for name, values in zip((played.COMPRESSION, played.RIM), shading, strict=True):
                     own_data.attribute(points, name, "FLOAT").data.foreach_set("value", values.astype(np.float32))
                 ground_mesh.write_positions(points, (height[:, None] * up).astype(np.float32))
-                with ground_mesh.stand_in(
+                with ground_surface.stand_in(
                     display_mesh, points, weather_at=frame, weather=group, with_users=False
                 ) as evaluated:
                     mesh = ground_mesh.mesh_of(evaluated)

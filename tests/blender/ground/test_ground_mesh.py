@@ -8,7 +8,13 @@ import pytest
 from mathutils import Euler
 
 from softground_addon.blender import compat
-from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh, still_ground
+from softground_addon.blender.ground import (
+    created_ground,
+    ground_checks,
+    ground_mesh,
+    ground_surface,
+    still_ground,
+)
 from softground_addon.blender.playback import display_key
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.blender.settings import found
@@ -96,12 +102,14 @@ def test_vertices_move_along_world_z_whatever_the_objects_transform(scene, trans
     bpy.context.view_layer.update()
     before = world(ground)
     index = np.arange(100, 200)
-    ground_mesh.write(ground, *pressed(index, -0.05, -0.03), b"record", 1.0)
+    ground_mesh.write(ground, *pressed(index, -0.05, -0.03), b"record", ground_surface.up_of(ground, 1.0))
     for key, change in (("Basis", -0.05), (DISPLAY_KEY, -0.03)):
         expected = before.copy()
         expected[index, 2] += change
         assert np.allclose(world(ground, key), expected, atol=1e-5)
-    height = ground_mesh.terrain_of(ground_mesh.undisturbed_surface(ground, 1.0)).heights(before[:, 0], before[:, 1])
+    height = ground_surface.terrain_of(ground_surface.undisturbed_surface(ground, 1.0)).heights(
+        before[:, 0], before[:, 1]
+    )
     inside = np.isfinite(height)
     assert inside.mean() > 0.9
     assert np.allclose(height[inside], before[inside, 2], atol=1e-5)
@@ -112,9 +120,9 @@ def test_restoring_gives_the_same_bytes_back(scene):
     ground.data.attributes.new("mine", "FLOAT", "POINT")
     ground.data.attributes.active_index = 3
     before = fingerprints.of_file()
-    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", 1.0)
+    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", ground_surface.up_of(ground, 1.0))
     assert fingerprints.of_file() != before
-    ground_mesh.write(ground, *pressed(np.arange(30, 70), -0.02, -0.02), b"other", 1.0)
+    ground_mesh.write(ground, *pressed(np.arange(30, 70), -0.02, -0.02), b"other", ground_surface.up_of(ground, 1.0))
     ground_mesh.restore(ground)
     assert fingerprints.of_file() == before
 
@@ -122,8 +130,8 @@ def test_restoring_gives_the_same_bytes_back(scene):
 def test_a_second_bake_replaces_the_first(scene):
     ground = grid(scene)
     before = world(ground)
-    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", 1.0)
-    ground_mesh.write(ground, *pressed(np.arange(50, 60), -0.02, -0.01), b"other", 1.0)
+    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", ground_surface.up_of(ground, 1.0))
+    ground_mesh.write(ground, *pressed(np.arange(50, 60), -0.02, -0.01), b"other", ground_surface.up_of(ground, 1.0))
     moved = np.flatnonzero(world(ground, "Basis")[:, 2] != before[:, 2])
     assert np.array_equal(moved, np.arange(50, 60))
     assert bytes(ground.data[ground_mesh.RECORD]).rstrip(b"\0") == b"other"
@@ -133,9 +141,14 @@ def test_the_undisturbed_surface_includes_the_users_modifiers_but_not_the_bake(s
     ground = grid(scene)
     displace = ground.modifiers.new("lift", "DISPLACE")
     displace.mid_level, displace.strength = 0.0, 0.25
-    ground_mesh.write(ground, *pressed(np.arange(len(ground.data.vertices)), -0.05, -0.05), b"record", 1.0)
+    ground_mesh.write(
+        ground,
+        *pressed(np.arange(len(ground.data.vertices)), -0.05, -0.05),
+        b"record",
+        ground_surface.up_of(ground, 1.0),
+    )
     before = fingerprints.of_file()
-    surface = ground_mesh.undisturbed_surface(ground, 1.0)
+    surface = ground_surface.undisturbed_surface(ground, 1.0)
     assert np.allclose(surface.vertices[:, 2], 0.25, atol=1e-6)
     assert fingerprints.of_file() == before
 
@@ -194,7 +207,7 @@ def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is
     shown = world(ground.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     for frame in (1, 40, 90):
         scene.frame_set(frame)
-        taken = ground_mesh.undisturbed_surface(ground, 1.0).vertices
+        taken = ground_surface.undisturbed_surface(ground, 1.0).vertices
         np.testing.assert_allclose(taken, shown, atol=1e-6)
     assert np.ptp(shown[:, 2]) > 0.1
     wave.show_viewport = False
@@ -231,5 +244,5 @@ def test_a_modifier_that_changes_is_read_at_the_first_frame_of_the_scenes_own_ti
     shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices[0].co.z
     assert shown == pytest.approx(1.1 * 100 / stretch, rel=1e-5)
     scene.frame_set(40)
-    surface = ground_mesh.undisturbed_surface(ground, 1.0)
+    surface = ground_surface.undisturbed_surface(ground, 1.0)
     assert surface.vertices[:, 2] == pytest.approx(shown, rel=1e-5)

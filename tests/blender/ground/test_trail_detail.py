@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
+from softground_addon.blender.ground import ground_surface, refined_mesh, trail_detail
 from softground_addon.blender.settings import found
 from softground_addon.core.meshing.refinement import refine
 from softground_addon.core.meshing.region import Region
@@ -359,4 +359,4 @@ def test_a_transformed_ground_is_cut_where_the_trail_is_in_the_world(scene):
     new = world[len(ground.data.vertices) :, :2]
     near = (new > [-0.6, -0.4]).all(axis=1) & (new < [1.2, 0.6]).all(axis=1)
     assert near.mean() > 0.9
-    assert ground_mesh.undisturbed_surface(detail, 1.0).vertices == pytest.approx(world, abs=1e-6)
+    assert ground_surface.undisturbed_surface(detail, 1.0).vertices == pytest.approx(world, abs=1e-6)

@@ -389,7 +389,7 @@ def test_scenes_start_with_the_preset_of_the_preferences(scene, user_folder, mon
         ours.module = settings.ADD_ON
         ours.preferences.default_preset = "Mud"
         assert ground_presets.default_preset().name == "Snow"  # in background, on every machine alike
-        monkeypatch.setattr(settings, "_preferred", lambda: ours.preferences.default_preset)
+        monkeypatch.setattr(ground_presets, "_preferred", lambda: ours.preferences.default_preset)
         assert preset_menu.title_of_ground(scene.softground) == "Mud"
         walker(scene, frames=24)
         bpy.ops.softground.add_character()

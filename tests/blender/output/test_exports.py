@@ -7,7 +7,7 @@ import pytest
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_mesh, ground_surface
 from softground_addon.blender.output import exports, image_exports
 from softground_addon.core.errors import InputError
 from softground_addon.core.playback.ramps import TOLERANCE
@@ -93,7 +93,7 @@ def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapp
         for frame in np.linspace(*frames, 6).round().astype(int).tolist()[1:]:
             world = played(ground, frame)
             sample = recorded(ground, frame, *world[:, :2].T.astype(float))
-            moved = world[:, 2] - ground_mesh.rest_vertices(ground, 1.0)[:, 2]
+            moved = world[:, 2] - ground_surface.rest_vertices(ground, 1.0)[:, 2]
             assert np.abs(moved - sample.display).max() <= TOLERANCE + 2e-6
 
 

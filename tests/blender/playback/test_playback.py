@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import ground_mesh, ground_surface
 from softground_addon.blender.playback import playback
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.core.ground.material import GroundMaterial
@@ -43,14 +43,14 @@ def ground_object(scene, spacing=0.02, matrix=None):
 
 def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True):
     """What the bake job does once the record is there."""
-    surface = ground_mesh.undisturbed_surface(ground, unit_scale)
+    surface = ground_surface.undisturbed_surface(ground, unit_scale)
     pressed_ground = PressedGround.at(
         footprints, frame=1e9, frame_rate=30.0, cell_size=0.01, blur_sigma=material.blur_sigma
     )
     index = np.flatnonzero(pressed_ground.covers(*surface.vertices[:, :2].T))
     place = surface.vertices[index, :2].T
-    ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
-    up = ground_mesh.up_of(ground, unit_scale)
+    up = ground_surface.up_of(ground, unit_scale)
+    ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", up, shape_keys=shape_keys)
     spans, lines = playback_curves_at(footprints, *place, blur_sigma=material.blur_sigma, frame_rate=30.0)
     with playback.keyframe_tables(lines, lines.position.unpacked()) as table:
         playback.attach(ground, index[spans.point], spans, table, up=up)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground.ground_mesh import terrain_of, undisturbed_surface
+from softground_addon.blender.ground.ground_surface import terrain_of, undisturbed_surface
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts

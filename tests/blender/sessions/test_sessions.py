@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from mathutils import Matrix
 
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_surface
 from softground_addon.blender.live import live
 from softground_addon.blender.playback import playback
 from softground_addon.core.playback.ramps import TOLERANCE
@@ -180,7 +180,7 @@ class ArtistAtWork(RuleBasedStateMachine):
         ground = self.options.ground
         display_mesh = baked_ground.display_mesh_of(ground)
         footprints, about = baked_ground.load(ground)
-        rest = ground_mesh.rest_vertices(display_mesh, 1.0)
+        rest = ground_surface.rest_vertices(display_mesh, 1.0)
         cell = about["inputs"]["cell_size_m"]
         for frame in (FRAMES, 9.0, 14.5, 0.0):
             bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
