@@ -28,7 +28,7 @@ from sample_scenes.keys import write_action
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.hand_hardness import DENSITY, PACKED_DENSITY, plates, snow
 from softground_addon.core.ground.material import STANDARD_GRAVITY, GroundMaterial
-from softground_addon.core.pressing.indentation import stress
+from softground_addon.core.imprints.indentation import stress
 from softground_addon.core.record.footprints import Footprint
 from tests.validation.ground_presses import sole_depth, wheel_depth
 from tests.validation.plots import plot_boots

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..findings import Finding
 from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
+from ..imprints.sole_points import places, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.missed_steps import advice, missed_steps
 from ..loads.sliding import treadmill_speed
@@ -19,7 +20,6 @@ from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
 from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
-from ..pressing.sole_points import places, sole_points
 from ..record.footprints import Footprint
 from .skin_check import OFF_SKIN, level_on_slope, skin_check
 

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
+from ..imprints.sole_points import SolePoints, sole_points
 from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
@@ -25,7 +26,6 @@ from ..pressing.ground_cells import GroundCells, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
 from ..pressing.sole_layout import SoleLayout
-from ..pressing.sole_points import SolePoints, sole_points
 from ..pressing.solver import GroundSolver
 from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from ..record.footprints import Footprint

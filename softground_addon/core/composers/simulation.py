@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
+from ..imprints.sole_points import SolePoints, flat_pose, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
 from ..motion.sole_motion import Sole
@@ -21,7 +22,6 @@ from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
 from ..pressing.sole_layout import SoleLayout
-from ..pressing.sole_points import SolePoints, flat_pose, sole_points
 from ..pressing.solver import GroundSolver
 from ..record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
 from ..record.footprints import Footprint

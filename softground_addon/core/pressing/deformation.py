@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..ground.ground_law import loose_strain, packed, strain
 from ..ground.material import GroundMaterial
+from ..imprints.sole_points import touching_fraction
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -92,27 +93,6 @@ def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, lan
     return step / time
 
 
-def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
-    """Share of each piece of a posed sole that touches the ground, 0 to 1.
-
-    The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
-    ground too. A tolerance on top stands for what is not known: the softness of skin and shoe and the exact pose.
-    It ends in a ramp as wide as itself, so that the area is continuous over space and time.
-
-    Parameters
-    ----------
-    clearance : float array
-        Height above the undisturbed ground, less that of the sole's lowest point [m].
-    sinkage : float array
-        How far the ground has given way under the lowest point [m].
-    tolerance : float [m]
-    """
-    fraction = sinkage - clearance
-    fraction *= 1.0 / tolerance
-    fraction += 1.5
-    return np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
-
-
 def sink(
     clearance: Array,
     area: Array,
@@ -140,7 +120,7 @@ def sink(
     force : (N,) float array
         Normal force on the sole [N].
     tolerance : float
-        See `touching_fraction` [m].
+        See `sole_points.touching_fraction` [m].
     step : float
         Time step [s].
     material : GroundMaterial

@@ -13,6 +13,8 @@ from ..ground.heightfield import Surface
 from ..ground.material import GroundMaterial
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, layer_factors
+from ..imprints.indentation import stress
+from ..imprints.prop_imprint import ground_under
 from ..motion.props import Prop
 from ..motion.sole_motion import Sole
 from ..numerics.interpolation import turning
@@ -20,8 +22,6 @@ from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import compression_rate
 from .ground_cells import GroundCells, Imprints, Loads
-from .indentation import stress
-from .prop_imprint import ground_under
 from .rim import in_contact, rim_weights, whole_reach
 
 Array = NDArray[np.float64]

@@ -9,15 +9,23 @@ from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
 from ..ground.variation import layer_factors
+from ..imprints.sole_imprint import PatchOverCells, cell_coverage, patches_over_cells
+from ..imprints.sole_points import (
+    PointContact,
+    SolePoints,
+    centroid,
+    contact_window,
+    places,
+    point_contact,
+    touching_fraction,
+)
 from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
-from .deformation import Sinking, compression_rate, sink, target_compression, touching_fraction
+from .deformation import Sinking, compression_rate, sink, target_compression
 from .ground_cells import GroundCells, Imprints, Loads, UndisturbedCells
 from .pressure import pressure_field, spread_out
 from .rim import in_contact, rim_weights, whole_reach
-from .sole_imprint import PatchOverCells, cell_coverage, patches_over_cells
-from .sole_points import PointContact, SolePoints, centroid, contact_window, places, point_contact
 
 Array = NDArray[np.float64]
 

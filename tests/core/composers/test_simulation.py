@@ -13,8 +13,8 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
+from softground_addon.core.imprints.sole_points import TOLERANCE
 from softground_addon.core.motion.motion import LowSkin
-from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose
 from tests.core.character import Slope
 from tests.core.walkers import (

@@ -22,8 +22,8 @@ from softground_addon.core.ground.hand_hardness import (
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.imprints.indentation import Springs, stress
 from softground_addon.core.pressing.deformation import target_compression
-from softground_addon.core.pressing.indentation import Springs, stress
 from softground_addon.core.pressing.pressure import spread_out
 from tests.core.prop_bodies import box, prop_sole
 from tests.core.walkers import box_sole, loads_of, pose, pressed, standing, walk

@@ -8,12 +8,12 @@ from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.imprints.sole_points import touching_fraction
 from softground_addon.core.pressing.deformation import (
     compress,
     compression_rate,
     sink,
     target_compression,
-    touching_fraction,
 )
 from softground_addon.core.pressing.rim import dilate, displaced_volume, in_contact, rim_weights
 from tests.core.walkers import equilibrium_depth

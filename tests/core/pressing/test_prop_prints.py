@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from softground_addon.core.composers.prediction import pressed_contacts
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.imprints.indentation import Springs, stress
 from softground_addon.core.numerics.rigid import rotation
-from softground_addon.core.pressing.indentation import Springs, stress
 from tests.core.character import Slope
 from tests.core.prop_bodies import box, prop_sole, rolling, sphere
 from tests.core.walkers import loads_of, pose, pressed

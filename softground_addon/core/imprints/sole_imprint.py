@@ -14,8 +14,7 @@ from ..ground.heightfield import Surface
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
 from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
-from .deformation import touching_fraction
-from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps
+from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps, touching_fraction
 
 Array = NDArray[np.float64]
 PatchOverCells = tuple[NDArray[np.intp], Single, Single]
@@ -36,9 +35,9 @@ def cell_coverage(
     fine : Window
         Cells that are `divisions` times smaller than those looked for.
     sinkage : (N,) float array
-        See `deformation.touching_fraction` [m].
+        See `sole_points.touching_fraction` [m].
     tolerance : float
-        See `deformation.touching_fraction` [m].
+        See `sole_points.touching_fraction` [m].
     divisions : int
         From `SolePoints.cell_divisions`.
 
@@ -71,7 +70,7 @@ def patches_over_cells(
     lowest : (N,) float array
         Height of the sole's lowest point above the undisturbed ground [m].
     tolerance : float
-        See `deformation.touching_fraction` [m].
+        See `sole_points.touching_fraction` [m].
 
     Yields
     ------

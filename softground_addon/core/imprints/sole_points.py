@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -293,3 +294,24 @@ def _patch_points(patch: SolePatch) -> PatchPoints:
     positions = np.stack([x, y, patch.heights[nodes]], axis=-1)[inside]
     normals = np.stack([-slope_x[nodes], -slope_y[nodes], np.ones_like(x)], axis=-1)[inside]
     return PatchPoints(positions, normals, covered[inside] * (patch.area / covered.sum()))
+
+
+def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
+    """Share of each piece of a posed sole that touches the ground, 0 to 1.
+
+    The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
+    ground too. A tolerance on top stands for what is not known: the softness of skin and shoe and the exact pose.
+    It ends in a ramp as wide as itself, so that the area is continuous over space and time.
+
+    Parameters
+    ----------
+    clearance : float array
+        Height above the undisturbed ground, less that of the sole's lowest point [m].
+    sinkage : float array
+        How far the ground has given way under the lowest point [m].
+    tolerance : float [m]
+    """
+    fraction = sinkage - clearance
+    fraction *= 1.0 / tolerance
+    fraction += 1.5
+    return np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)

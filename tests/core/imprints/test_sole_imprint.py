@@ -6,9 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.heightfield import FlatTerrain, TerrainTiles
+from softground_addon.core.imprints.sole_imprint import cell_coverage, patches_over_cells
+from softground_addon.core.imprints.sole_points import TOLERANCE, centroid, contact_window, point_contact, sole_points
 from softground_addon.core.motion.sole_motion import Sole
-from softground_addon.core.pressing.sole_imprint import cell_coverage, patches_over_cells
-from softground_addon.core.pressing.sole_points import TOLERANCE, centroid, contact_window, point_contact, sole_points
 from tests.core.walkers import box_sole, foot_sole, pose, sphere_sole
 
 LENGTH, WIDTH = 0.25, 0.09
