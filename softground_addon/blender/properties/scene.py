@@ -200,6 +200,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         step=10,
         precision=2,
     )
+    soil_moisture: by_feel(
+        "Moisture",
+        "How wet the soil is: 0 dry and firm, 0.25 moist, 0.5 stiff mud, 0.75 soft mud, 1 liquid. Sets the stiffness",
+        hand_hardness.wetness_of,
+        hand_hardness.wetted,
+        min=0.0,
+        max=1.0,
+        step=10,
+        precision=2,
+    )
     painted: PointerProperty(name="Masks", type=SoftGroundPainted)
     pressure: EnumProperty(
         name="Pressure",

@@ -1,4 +1,4 @@
-"""Ground from what people know of it: snow by the hardness of a hand's test, soil by the pressing of plates."""
+"""Ground from what people know of it: snow by the hand test, sand and soil by their moisture, soil by plates too."""
 
 from __future__ import annotations
 
@@ -37,6 +37,11 @@ SAND_EDGES = np.array([0.00065, 0.0192, 0.0192, 0.0192])
 """Of a dune, and of damp, wet and soaked sand, under the standing boot [m]: the first and third by plates, the others
 placed. Dry and soaked sand are deep, the moist states between are shallow (Jackson, Whyte and Romano 2010,
 doi:10.1080/10420940.2010.510026)."""
+SOIL_MOISTURE = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+SOIL_DEPTH = np.array([0.004, 0.008, 0.0114, 0.037, 0.098])
+"""Of dry loam, of soil, and of stiff, soft and liquid mud, under the standing boot [m]: the first by plates (Wong,
+Theory of Ground Vehicles), the others placed. The wetter, the deeper (Platt, Hasiotis and Hirmas 2012,
+doi:10.2110/palo.2012.p12-006r)."""
 BY_HARDNESS = ("youngs_modulus", "layer_depth", "exponent", "densest", "edge_width", "spread")
 """Fields that the hand hardness sets."""
 
@@ -94,8 +99,7 @@ def moistened(material: GroundMaterial, moisture: float) -> GroundMaterial:
     depth, exponent, edges = _of_moisture(moisture)
     dry = float(np.interp(moisture, MOISTURE[:2], (1.0, 0.0)))
     material = replace(material, exponent=float(exponent), edge_width=float(edges), cohesionless=dry)
-    limit = FULL * material.deepest if material.densest else material.layer_depth
-    return with_boot_depth(material, min(float(np.exp(depth)), limit))
+    return _with_depth_up_to_packed(material, float(np.exp(depth)))
 
 
 def moisture_of(material: GroundMaterial) -> float:
@@ -104,6 +108,21 @@ def moisture_of(material: GroundMaterial) -> float:
     depth, exponent, edges = _of_moisture(moisture)
     apart = (depth - np.log(boot_depth(material))) ** 2 + (exponent - material.exponent) ** 2
     return float(moisture[(apart + ((edges - material.edge_width) / BOOT_WIDTH) ** 2).argmin()])
+
+
+def wetted(material: GroundMaterial, moisture: float) -> GroundMaterial:
+    """Soil or mud as it is but for its moisture, from 0, dry and firm, to 1, liquid."""
+    return _with_depth_up_to_packed(material, float(np.exp(np.interp(moisture, SOIL_MOISTURE, np.log(SOIL_DEPTH)))))
+
+
+def wetness_of(material: GroundMaterial) -> float:
+    """The moisture of the soil in which a standing boot sinks as deep."""
+    return float(np.interp(np.log(boot_depth(material)), np.log(SOIL_DEPTH), SOIL_MOISTURE))
+
+
+def _with_depth_up_to_packed(material: GroundMaterial, depth: float) -> GroundMaterial:
+    limit = FULL * material.deepest if material.densest else material.layer_depth
+    return with_boot_depth(material, min(depth, limit))
 
 
 def _of_moisture(moisture: Any) -> tuple[Any, Any, Any]:

@@ -159,7 +159,8 @@ class SurfaceRecord:
     melts, wet, pales : bool
         True of snow; of what is wet to begin with; of wet sand, which turns pale around a loaded foot.
     control : str or None
-        Field of the panel that sets the stiffness by what people know: 'hand_hardness' of snow, 'moisture' of sand.
+        Field of the panel that sets the stiffness by what people know: 'hand_hardness' of snow, 'moisture' of sand,
+        'soil_moisture' of soil and mud.
     """
 
     name: str
@@ -232,7 +233,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.3, 0.6, 0.5, 0.8, (250, 900), (0.004, 0.012), 60.0, 1.8, (150, 1200), (60, 100)),
         colour=(0.10, 0.065, 0.04), shades=(0.70, 1.25), swell=0.16,
         shader="mud", relief="mud", midi_note=48,
-        soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True,
+        soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",
     ),
     SurfaceRecord(
         "soil",
@@ -242,7 +243,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.9, 0.35, 0.45, 0.0, (500, 3000), (0.002, 0.007), 500.0, 1.3, (400, 2500), (70, 140)),
         colour=(0.12, 0.07, 0.04), shades=(0.70, 1.25), swell=0.16,
         shader="soil", relief="soil", midi_note=52,
-        soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0),
+        soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0), control="soil_moisture",
     ),
 )}  # fmt: skip
 """Surfaces by name, in the order in which the user sees them."""

@@ -223,6 +223,22 @@ def test_moisture_reads_the_sand_and_sets_how_firm_it_is(scene):
     assert options.material.youngs_modulus == pytest.approx(2040e3, rel=0.05)
 
 
+def test_moisture_reads_soil_and_mud_and_sets_how_firm_they_are(scene):
+    options = scene.softground
+    for preset, moisture in (
+        ("firm_loam", 0.0),
+        ("soil", 0.25),
+        ("stiff_mud", 0.5),
+        ("soft_mud", 0.75),
+        ("liquid_mud", 1),
+    ):
+        ground_presets.apply_preset(scene.softground, find(preset))
+        assert options.soil_moisture == pytest.approx(moisture, abs=0.01)
+    options.soil_moisture = 0.75
+    assert options.material.youngs_modulus == pytest.approx(find("soft_mud").material.youngs_modulus, rel=0.02)
+    assert options.material.poisson_ratio == find("liquid_mud").material.poisson_ratio
+
+
 def test_packing_is_switched_by_a_box(scene):
     material = scene.softground.material
     assert not material.packs

@@ -18,9 +18,12 @@ from softground_addon.core.ground.hand_hardness import (
     moisture_of,
     plates,
     snow,
+    wetness_of,
+    wetted,
 )
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.presets import find
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.imprints.indentation import Springs, stress
 from softground_addon.core.pressing.deformation import target_compression
@@ -200,6 +203,21 @@ def test_hand_hardness_leaves_rim_and_settling_time():
     assert (harder.poisson_ratio, harder.characteristic_time) == (0.1, 0.15)
     assert harder.deepest == snow(3.5).deepest
     assert boot_depth(harder) == pytest.approx(0.10)
+
+
+@pytest.mark.parametrize("name", ["firm_loam", "soil", "stiff_mud", "liquid_mud"])
+def test_soil_is_the_deeper_the_wetter_and_stays_what_it_is_otherwise(name):
+    soil = find(name).material
+    moisture = np.linspace(0, 1, 11)
+    wetter = [wetted(soil, share) for share in moisture]
+    assert [wetness_of(one) for one in wetter] == pytest.approx(moisture, abs=1e-6)
+    assert (np.diff([boot_depth(one) for one in wetter]) > 0).all()
+    assert all(replace(one, youngs_modulus=soil.youngs_modulus) == soil for one in wetter)
+
+
+def test_soil_that_is_a_thin_layer_is_wetted_until_it_gives_way_no_further():
+    thin = replace(find("loose_soil").material, layer_depth=0.05)
+    assert boot_depth(wetted(thin, 1.0)) == pytest.approx(0.97 * thin.deepest)
 
 
 @pytest.mark.parametrize("layer", [0.1, 0.3])
