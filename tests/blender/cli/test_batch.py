@@ -240,12 +240,14 @@ def test_the_table_shows_hostile_names_on_one_line():
     assert r"first\nsecond" in lines[1]
 
 
-@pytest.mark.slow
-@pytest.mark.marathon
 @pytest.mark.timeout(1800)
-def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
+@pytest.mark.parametrize(
+    ("shots", "kills"),
+    [pytest.param(10, 2, marks=pytest.mark.slow), pytest.param(50, 5, marks=pytest.mark.marathon)],
+)
+def test_a_batch_killed_a_few_times_equals_the_uninterrupted_one(night, shots, kills):
     """Kill -9 of the batch at random moments; every result is that of one go, and nothing done is done again."""
-    manifest = night(50)
+    manifest = night(shots)
     started = time.perf_counter()
     assert run(manifest, "--jobs", 2, timeout=900).returncode == 0
     seconds = time.perf_counter() - started
@@ -255,9 +257,9 @@ def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
             path.unlink()
     chance = random.Random(5)
     finished: dict[Path, int] = {}
-    for _ in range(5):
+    for _ in range(kills):
         process = begin(manifest, "--jobs", 2, "--progress", "none")
-        time.sleep(chance.uniform(0.05, 0.2) * seconds)
+        time.sleep(chance.uniform(0.25, 1.0) / kills * seconds)
         process.kill()
         process.wait()
         time.sleep(1.0)  # until its workers have noticed

@@ -42,7 +42,7 @@ def kill_at(moment, *arguments):
 
 @posix
 @pytest.mark.parametrize(
-    "kills", [pytest.param(20, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
+    "kills", [pytest.param(10, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
 )
 def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, kills):
     """Kill -9 at random moments, most of them around the saving."""
@@ -94,7 +94,7 @@ sys.exit(main())
 @posix
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize(
-    "kills", [pytest.param(12, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
+    "kills", [pytest.param(6, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
 )
 def test_a_bake_killed_within_its_save_leaves_whole_files_and_a_receipt_that_is_true(scene, tmp_path, kills):
     """Between the first write and the last rename: at each step of it, or up to a tenth of a second later."""
