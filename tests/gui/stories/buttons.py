@@ -25,7 +25,8 @@ def tell(hand: Hand, facts: dict) -> Steps:
     hand.show_wires()
     armature = open_walk(60, 24)
     write_action(armature, on_the_spot(), "On the Spot")
-    scene().softground.cell_size = 0.02
+    options = scene().softground
+    options.cell_size, options.relief, options.debris = 0.02, "OFF", False  # soon baked and soon drawn
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.add_character")
     yield from done(hand)
