@@ -18,12 +18,10 @@ LINT_READY := .venv-core/.ready-lint
 # One process for each processor, but no crowd of Blenders on a large machine. What measures time runs alone.
 SIDE_BY_SIDE := -n auto --maxprocesses 8 --dist worksteal
 
-# make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found. SAMPLES=4 makes
-# its pictures sooner.
+# make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found.
 MOTION ?=
 SCALE ?= 0.01
 UP ?=
-SAMPLES ?=
 
 .PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving film core test slow versions marathon bench validate validate-ground zoo sheets gui pictures package installed lint types architecture clean
 
@@ -44,7 +42,7 @@ $(LINT_READY): $(CORE_READY) requirements/lint.txt
 ready: $(READY)
 
 demo: $(READY)
-	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP)) $(if $(SAMPLES),--samples $(SAMPLES))
+	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
 
 # The scenes of docs/figures.md with their pictures, from nothing, into build/scenes.
 scenes: $(READY)

@@ -37,13 +37,7 @@ def check_mass(name: str, mass: float) -> None:
 
 
 def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
-    """Return whether a character can be read.
-
-    Raises
-    ------
-    InputError
-        If not; names the armature and the remedy.
-    """
+    """Raise InputError, with the armature and the remedy, where a character cannot be read."""
     require_armature(armature)
     name = armature.name
     check_mass(name, mass)

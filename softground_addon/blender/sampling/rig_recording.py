@@ -46,10 +46,7 @@ def record(
         recording = yield from _read_keys(full_name, frames, names, units, below)
     else:
         recording = yield from _evaluate(scene, full_name, frames, names, units, props, shapes, below, handled=handled)
-    if handled and findings is not None:
-        findings.append(handled_finding(rig))
-    check_finite(rig, recording)
-    return recording
+    return _checked(rig, recording, findings if handled else None)
 
 
 def record_props(
@@ -69,7 +66,12 @@ def record_props(
     """
     handled = yield from _moved_by_handlers(scene, "", frames, [], props)
     recording = yield from _evaluate(scene, "", frames, [], units, props, handled=handled)
-    if handled and findings is not None:
+    return _checked(name, recording, findings if handled else None)
+
+
+def _checked(name: str, recording: Recording, findings: list[Finding] | None) -> Recording:
+    """The recording, which must be finite; `findings` take that handlers of others moved it."""
+    if findings is not None:
         findings.append(handled_finding(name))
     check_finite(name, recording)
     return recording

@@ -100,7 +100,7 @@ def no_motion(motion: CharacterMotion) -> Finding | None:
 
 
 def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
-    """Return whether it moves, prints and gets along."""
+    """Findings where it stands still, leaves no prints, or walks on the spot."""
     motion, hard = character.motion, character.contacts.hard
     hard = np.zeros(1, dtype=bool) if hard is None else hard
     if still := no_motion(motion):
@@ -140,7 +140,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
 
 
 def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
-    """Return whether the body, its mass and the cells suit each other."""
+    """Findings where the body, its mass and the cells do not suit each other."""
     length = shortest_length(sole.sole.length for sole in motion.soles)
     if length < FEW_CELLS * cell_size:
         yield Finding(
@@ -175,7 +175,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
 
 
 def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
-    """Return whether some feet float higher than others."""
+    """A finding where some feet are planted higher than others."""
     motion, contacts = character.motion, character.contacts
     feet = [number for number, sole in enumerate(motion.soles) if sole.sole.prop is None]
     offset = {motion.soles[n].sole.name: float(contacts.offset[n]) for n in feet if contacts.touching[:, n].any()}
@@ -193,7 +193,7 @@ def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
 
 
 def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Finding]:
-    """Return whether it walks as fast as legs of its length swing."""
+    """A finding where it walks slower than legs of its length swing."""
     motion = character.motion
     if motion.centre is not None or motion.four_legged:
         return
