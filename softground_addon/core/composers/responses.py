@@ -18,6 +18,7 @@ from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
+from ..response.leaving import leaving_early
 from ..response.moved_steps import Followed, OutOfReach, follow
 from ..response.performance import suggested_speed
 from ..response.response import Gaps, at_scene_frames, gaps, mean_sinkage, respond, stood_on
@@ -125,8 +126,9 @@ def responses_of(
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
-        pressed = touching, terrain, left.edited
         followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
+        standing = leaving_early(motion, touching, left.edited) if options.grounding else touching
+        pressed = standing, terrain, left.edited
         yield
         response = yield from respond.slices(
             motion, *pressed, tilt=options.tilt, grounding=options.grounding, followed=followed

@@ -70,9 +70,14 @@ class SolePoints:
     length: float
 
     @property
+    def area(self) -> float:
+        """Area of the whole sole [m²]."""
+        return sum(float(patch.area.sum()) for patch in self.patches)
+
+    @property
     def width(self) -> float:
         """Mean width [m]."""
-        return sum(float(patch.area.sum()) for patch in self.patches) / self.length
+        return self.area / self.length
 
     @property
     def tolerance(self) -> float:

@@ -14,6 +14,7 @@ from ..motion.sole_motion import Sole, SoleMotion, SolePatch
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
+from .wading import depth_of_contacts, ploughed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -181,13 +182,14 @@ def place_sole(
     on_top = needed if undisturbed is ground else -lowest_clearance(turned, undisturbed, frames)
     if clearance is not None:
         needed = np.where(touching, needed + clearance, needed)
+    stands = touching & np.isfinite(on_top)
+    sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
     lift = between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
-    lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
+    missing = needed - lift - ploughed(depth_of_contacts(sinkage, touching), sole.sole.length)
+    lift += _swing_clearance(missing, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change
-    stands = touching & np.isfinite(on_top)
-    sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
     room = np.where(touching, 0.0, np.maximum(lift - needed, 0.0))
     return Placement(carry, lift, sinkage, room)
 

@@ -16,7 +16,7 @@ from ..numerics.plane_fit import smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation, unit
 from ..numerics.slices import Slices, sliced
 from .foot_placement import Placement
-from .hips import HIPS_TIME, hips_follow, hips_go_along
+from .hips import HIPS_TIME, hips_follow, hips_go_along, wading_depth
 from .knee_pace import PacedLeg, follow, relieve
 from .legs import Leg, solve
 
@@ -161,7 +161,11 @@ def settle(
         hips = {side: carried(tilted, leg.hip) + raised for side, leg in legs.items()}
         paced = _paced(legs, placements, touching, hips, ankles)
         relief = yield from relieve.slices(
-            paced, step=motion.time_step, time_scale=motion.time_scale, leg_length=motion.leg_length
+            paced,
+            step=motion.time_step,
+            time_scale=motion.time_scale,
+            leg_length=motion.leg_length,
+            wading=wading_depth(motion, dict(placements.values()), touching)[1],
         )
         raised, feet = raised + relief.hips, relief.feet
     body = tilted.copy()

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..numerics.plane_fit import smoothed
 from .foot_placement import Placement
+from .wading import DEPTH_TIME, body_depth, depth_of_contacts
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,7 +29,8 @@ LOAD_TIME = 0.05
 def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> Array:
     """Height that the hips gain (F,) [m]: that of the standing soles on the whole, less the sinkage of the deeper.
 
-    Smooth over time: weight passes from foot to foot, and hips that would drop into every print anew bounce.
+    Smooth over time: weight passes from foot to foot, and hips that would drop into every print anew bounce. In deep
+    ground they keep the mean depth of the feet over a stride, whichever of them stands.
 
     Parameters
     ----------
@@ -44,7 +47,19 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
     unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
     deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
     width = HIPS_TIME * motion.adult_second
-    return mean_over_time(unsunk, load, width) - mean_over_time(sinkage, load * deeper, width)
+    risen = mean_over_time(unsunk, load, width)
+    height = risen - mean_over_time(sinkage, load * deeper, width)
+    depth, share = wading_depth(motion, placements, touching)
+    return height + share * (risen - depth - height) if share.any() else height
+
+
+def wading_depth(
+    motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask
+) -> tuple[Array, Array]:
+    """Depth (F,) in which a body wades [m], and how much it wades (F,), 0 to 1; see `hips_follow`."""
+    depths = {sole: depth_of_contacts(placed.sinkage, touching[:, sole]) for sole, placed in placements.items()}
+    depth = body_depth(depths, DEPTH_TIME * motion.adult_second)
+    return depth, wading(depth, float(np.mean([motion.soles[sole].sole.length for sole in placements])))
 
 
 def hips_go_along(

@@ -26,6 +26,8 @@ _FRAME = 1 / 30
 """The time that the pace of a knee refers to [s]."""
 KNEE_PACE = np.radians(13.0) / _FRAME
 """Largest speed of a knee [rad/s], for an adult, or that of the source where it is larger."""
+WADING_PACE = 2.0
+"""How many times faster the knees of a body may turn that wades: a foot falls into deep ground and is pulled out of it."""
 SOURCE_WINDOW = 0.05
 """Time around an instant in which the source's own pace counts [s], for an adult."""
 NEARLY_STRAIGHT = np.radians(8.0)
@@ -125,7 +127,14 @@ class _Hips:
 
 
 @sliced
-def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Slices[Relief]:
+def relieve(
+    legs: Mapping[str, PacedLeg],
+    *,
+    step: float,
+    time_scale: float,
+    leg_length: float,
+    wading: Array | float = 0.0,
+) -> Slices[Relief]:
     """The least and smoothest correction with which no knee turns too fast.
 
     Parameters
@@ -137,10 +146,13 @@ def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg
     time_scale : float
         Duration of the motion over that of an adult.
     leg_length : float [m]
+    wading : (F,) float array or 0
+        How much the body wades at each sample, 0 to 1.
     """
     up, count = np.array([[0.0, 0.0, 1.0]]), len(next(iter(legs.values())).stands)
     hips = _Hips(up, np.zeros((count, 1)), 2, (SMOOTHING_TIME * time_scale / step) ** 2, MAGNITUDE)
-    paces = [_allowed_turn(leg, step, time_scale) for leg in legs.values()]
+    pace = KNEE_PACE * (1.0 + (WADING_PACE - 1.0) * np.broadcast_to(wading, count)[1:])
+    paces = [_allowed_turn(leg, pace, step, time_scale) for leg in legs.values()]
     weights = np.geomspace(TOO_FAST / 100.0, TOO_FAST, STEPS)
     return (yield from _relieved(legs, hips, paces, weights, step, time_scale, leg_length))
 
@@ -248,12 +260,12 @@ def _cost(equations: Sequence[_Equations]) -> float:
     return float(sum(np.sum(each.weight * each.wanted**2) for each in equations))
 
 
-def _allowed_turn(leg: PacedLeg, step: float, time_scale: float) -> Array:
-    """Largest turn of a knee from each sample to the next, (F - 1,) [rad]."""
+def _allowed_turn(leg: PacedLeg, pace: Array, step: float, time_scale: float) -> Array:
+    """Largest turn of a knee from each sample to the next, (F - 1,) [rad], at a pace (F - 1,) [rad/s] or the source's."""
     source = np.abs(np.diff(leg.source.flexion))
     reach = max(1, round(SOURCE_WINDOW * time_scale / step))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(source, reach, mode="edge"), 2 * reach + 1).max(axis=1)
-    return np.maximum(KNEE_PACE * step / time_scale, around)
+    return np.maximum(pace * step / time_scale, around)
 
 
 def _pace_and_reach(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..ground.ground_law import loose_strain, packed, strain
 from ..ground.material import GroundMaterial
 from ..imprints.sole_points import touching_fraction
+from .plate import Plate
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,7 +29,7 @@ class Sinking:
     Attributes
     ----------
     area : (N,) float array
-        Area of contact at the moment [m²].
+        Area that bears at the moment [m²]: that of contact, or more under a `plate.Plate`.
     target : (N,) float array
         Compression that the stress of the moment would lead to [m].
     sinkage : (N,) float array
@@ -105,6 +106,7 @@ def sink(
     landing_speed: float = 0.0,
     firmness: float = 1.0,
     softness: Array | None = None,
+    plate: Plate | None = None,
 ) -> Sinking:
     """Follow a loaded sole into the ground.
 
@@ -132,14 +134,18 @@ def sink(
         See `GroundMaterial.firmness`.
     softness : (N, Q) float array, optional
         Compression of the ground under each point per that of the material, where the ground varies.
+    plate : Plate, optional
+        What the sole is in deep ground.
 
     Returns
     -------
     Sinking
     """
     steps = len(force)
-    touching_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
+    bearing_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
     rate = compression_rate(step, material)
+    if plate:
+        rate = plate.rate(rate, step)
     layer, modulus = material.layer_depth, material.youngs_modulus * firmness
     # Rounded as it always was where the ground is the paper's, so that old shots bake to the same bytes.
     per_pascal = layer / modulus if material.exponent == 1.0 and not material.firm_depth else 0.0
@@ -147,19 +153,22 @@ def sink(
     reached[0] = sinkage
     for k in range(steps):
         touching = touching_fraction(clearance[k], sinkage, tolerance)
-        touching_area[k] = touching @ area[k]
-        if force[k] > 0 and touching_area[k] > 0:
-            stress = force[k] / touching_area[k]
+        touching_area = bearing_area[k] = touching @ area[k]
+        if force[k] > 0 and touching_area > 0:
+            if plate:
+                bearing_area[k] = plate.bearing(touching_area)
+            stress = force[k] / bearing_area[k]
             fresh = stress * per_pascal or float(loose_strain(stress / modulus, material)) * layer
             if softness is not None:
-                fresh *= float(touching @ (area[k] * softness[k])) / touching_area[k]
+                fresh *= float(touching @ (area[k] * softness[k])) / touching_area
             target[k] = packed(fresh, material, layer)
             if follows_landing:
                 rate = compression_rate(step, material, target[k], landing_speed)
+                rate = plate.rate(rate, step) if plate else rate
             if sinkage > 0 or stress >= material.crust_stress:
                 sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
         reached[k + 1] = sinkage
-    return Sinking(touching_area, target, reached[:-1], float(sinkage))
+    return Sinking(bearing_area, target, reached[:-1], float(sinkage))
 
 
 def compress(

@@ -24,6 +24,7 @@ from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import Sinking, compression_rate, sink, target_compression
 from .ground_cells import GroundCells, Imprints, Loads, UndisturbedCells
+from .plate import Plate, plate_of
 from .pressure import pressure_field, spread_out
 from .rim import in_contact, rim_weights, whole_reach
 
@@ -69,6 +70,8 @@ class SoleLayout(ContactLayout):
         if factors:
             under = window.cells_under(*places(points, poses), cells.cell_size)
             softness = factors.softness(material.exponent)[under]
+        depth = target_compression(self.force.max(initial=0.0) / points.area, material, firmness=firmness)
+        plate = plate_of(points, float(depth) * (1.0 if softness is None else float(softness.mean())))
         sinking = sink(
             over_ground.clearance,
             area,
@@ -80,6 +83,7 @@ class SoleLayout(ContactLayout):
             landing_speed=landing_speed,
             firmness=firmness,
             softness=softness,
+            plate=plate,
         )
         fraction = touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
         printing = over_ground.area / upright * fraction
@@ -95,7 +99,9 @@ class SoleLayout(ContactLayout):
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
         rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed)
-        stress = self._stress(steps, window, cells, sinking, area * fraction)
+        if plate:
+            rate = plate.rate(rate, step)
+        stress = self._stress(steps, window, cells, sinking, area * fraction, plate)
         if factors and stress.ndim == 1:
             stress = stress[:, None, None]
         target = sinking.target
@@ -138,7 +144,15 @@ class SoleLayout(ContactLayout):
         middle[:, 2] -= over_ground.lowest + above
         return middle
 
-    def _stress(self, steps: slice, window: Window, cells: GroundCells, sinking: Sinking, touching: Array) -> Array:
+    def _stress(
+        self,
+        steps: slice,
+        window: Window,
+        cells: GroundCells,
+        sinking: Sinking,
+        touching: Array,
+        plate: Plate | None,
+    ) -> Array:
         """Normal stress at each of N steps, (N,) [Pa]; where the pressure rolls, of each cell, (N, rows, columns)."""
         stress = np.divide(self.force[steps], sinking.area, out=np.zeros(len(sinking.area)), where=sinking.target > 0)
         if cells.ground.pressure != "CENTRE_OF_PRESSURE":
@@ -146,6 +160,8 @@ class SoleLayout(ContactLayout):
         x, y = places(self.points, self.steps.poses[steps])
         field = pressure_field(x, y, touching, self.steps.centres[steps, :2], self.points.tolerance)
         relative = field.over(*window.centres(cells.cell_size))
+        if plate:
+            plate.level(relative)
         if cells.material.spread:
             spread_out(relative, cells.material.spread * sinking.sinkage / self._length)
         over_cells: Array = stress[:, None, None] * relative

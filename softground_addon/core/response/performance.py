@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.intervals import runs
-from ..numerics.plane_fit import smoothed
 from ..numerics.rigid import displacement, rotation
 
 Array = NDArray[np.float64]
@@ -27,8 +26,6 @@ BENT = 0.5
 """Descent of the hips that bends the knees, in sinkages."""
 ARMS_OUT = np.radians(35.0)
 """Angle by which the arms are raised sideways [rad]."""
-DEPTH_TIME = 0.4
-"""Standard deviation of the smoothing of the sinkage that the body responds to [s], for an adult."""
 
 _FIRST_CENTIMETRE, _PER_CENTIMETRE = 0.30, 0.082
 """Cost of walking in snow over that on a road, less 1: 0.30 + 0.082 per cm of sinkage (Pandolf, Haisman and Goldman
@@ -111,11 +108,6 @@ def swing_change(path: Array, depth: Array, touching: Mask, performance: Perform
             change[first:end, axis] = np.interp(behind, index, path[:, axis]) - path[first:end, axis]
     change[:, 2] = performance.knee_lift * depth * bell
     return change
-
-
-def body_depth(depths: Mapping[str, Array], width: float) -> Array:
-    """Sinkage that the whole body responds to (F,) [m]: the mean of its feet's, smooth over `width` samples."""
-    return smoothed(np.mean(list(depths.values()), axis=0), width)
 
 
 def raised_arms(

@@ -12,6 +12,7 @@ from ..ground.heightfield import FlatTerrain, Terrain
 from ..legs.foot_lock import moved
 from ..legs.foot_placement import Placement, lowest_clearance, place_sole, posed_points
 from ..legs.grounding import Response, heel_rises, leg_of, leg_soles, responding, settle, with_sole
+from ..legs.wading import DEPTH_TIME, body_depth
 from ..loads.contacts import Contacts, detect_contacts
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
@@ -21,7 +22,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
 from .moved_steps import Followed
-from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
+from .performance import BENT, Performance, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
 
 Array = NDArray[np.float64]

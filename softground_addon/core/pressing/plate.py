@@ -1,0 +1,56 @@
+"""A sole in deep ground: it sinks early and as one plate, which the travelling pressure only tilts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.deep_ground import wading
+from ..imprints.sole_points import SolePoints
+
+Array = NDArray[np.float64]
+
+FALL_TIME = 0.08
+"""Longest time in which deep ground gives way [s]; a foot falls through powder in about 0.1 s."""
+TILT = 0.05
+"""Share of the travelling pressure's departure from the mean that is left under a sole that wades: it tilts it."""
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A sole that bears with all of its area at once.
+
+    Attributes
+    ----------
+    share : float
+        From 0, as on shallow ground, to 1; see `deep_ground.wading`.
+    area : float
+        Of the whole sole [m²].
+    """
+
+    share: float
+    area: float
+
+    def bearing(self, touching: float) -> float:
+        """Area that bears the force [m²], while so much of it touches."""
+        return 1.0 / ((1.0 - self.share) / touching + self.share / self.area)
+
+    def rate(self, rate: Any, step: float) -> Any:
+        """Fraction of the target by which the ground gives way in a step [s], at least as fast as in `FALL_TIME`."""
+        time = step / rate
+        return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
+
+    def level(self, relative: Array) -> None:
+        """Make a pressure over its mean more even, in place."""
+        relative -= 1.0
+        relative *= 1.0 - self.share * (1.0 - TILT)
+        relative += 1.0
+
+
+def plate_of(points: SolePoints, depth: float) -> Plate | None:
+    """The plate that a sole is if its largest load presses all of it so deep [m]; None down to the ankle."""
+    share = float(wading(depth, points.length))
+    return Plate(share, points.area) if share else None
