@@ -23,12 +23,12 @@ PLOUGH = 0.65
 
 
 def depth_of_contacts(sinkage: Array, touching: Mask) -> Array:
-    """Median sinkage of a foot in each contact, (F,) [m], linear from the middle of one to that of the next."""
-    contacts = list(zip(*runs(touching), strict=True))
-    if not contacts:
+    """Sinkage of a foot in the middle of each contact, (F,) [m], linear from one to the next."""
+    first, end = runs(touching)
+    if not len(first):
         return np.zeros(len(sinkage))
-    middle = [(first + end - 1) / 2 for first, end in contacts]
-    return np.interp(np.arange(len(sinkage)), middle, [np.median(sinkage[first:end]) for first, end in contacts])
+    now, middle = np.arange(len(sinkage)), (first + end - 1) / 2
+    return np.interp(now, middle, np.interp(middle, now, sinkage))
 
 
 def body_depth(depths: Mapping[Any, Array], width: float) -> Array:

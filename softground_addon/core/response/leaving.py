@@ -15,7 +15,7 @@ from ..record.footprints import Footprint
 
 Mask = NDArray[np.bool_]
 
-LEAVE_TIME = 0.1
+LEAVE_TIME = 0.15
 """Time before its toe-off at which a foot starts to leave a deep print [s], for an adult, if another one stands."""
 
 
