@@ -229,7 +229,26 @@ def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
         for character in responses
         for short in character.out_of_reach
     ]
-    return without_legs + too_far
+    return without_legs + too_far + [_too_deep(each) for each in responses if _wades_too_deep(each)]
+
+
+DEEP_FOR_A_WALK = 0.6
+"""Mean depth from which a walk that is lowered into its prints does not look like wading any more, in leg lengths."""
+
+
+def _wades_too_deep(character: CharacterResponse) -> bool:
+    return bool(character.response.legs) and character.sinkage > DEEP_FOR_A_WALK * character.motion.leg_length
+
+
+def _too_deep(character: CharacterResponse) -> Finding:
+    name, depth, leg = character.motion.name, character.sinkage, character.motion.leg_length
+    return Finding(
+        "deep_for_this_walk",
+        "warning",
+        f"'{name}' sinks {depth * 100:.0f} cm deep, {depth / leg:.0%} of its legs: a walk made for firm ground does not "
+        "become wading by being lowered so far, and its knees stay bent.",
+        "Choose a firmer or shallower ground, or an animation of somebody who wades.",
+    )
 
 
 def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:

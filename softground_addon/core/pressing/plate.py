@@ -13,8 +13,8 @@ from ..imprints.sole_points import SolePoints
 
 Array = NDArray[np.float64]
 
-FALL_TIME = 0.08
-"""Longest time in which deep ground gives way [s]; a foot falls through powder in about 0.1 s."""
+FALL_TIME = 0.06
+"""Longest time in which deep ground gives way under a lasting load [s]: as the load grows, a foot falls in about 0.1 s."""
 TILT = 0.55
 """Share of what the travelling pressure exceeds its mean by that is left under a sole that wades: it tilts it. In settled
 snow, toes sink 2-6 cm deeper than the heel (make validate-ground)."""
