@@ -27,10 +27,10 @@ Mask = NDArray[np.bool_]
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
-ONE_PIECE_PASSES = 16
+ONE_PIECE_PASSES = 32
 """Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
-stand on other points. A pass that moves them no less than the one before is the last: points take turns at bearing."""
-IN_PLACE = 1e-4
+stand on other points. Each begins midway between where the last one began and ended, as points take turns at bearing."""
+IN_PLACE = 3e-4
 """Feet that move less than this from one time to the next are where they belong, in leg lengths."""
 
 RESTING = 0.5
@@ -132,26 +132,29 @@ def clean(
     soles = {side: sole for side, sole in leg_soles(motion).items() if not has_ankle(motion, side)}
     touches = {side: touching[:, sole] for side, sole in soles.items() if touching[:, sole].any()}
     middles = {side: leg_of(motion, side, soles[side]).ankle for side in touches}
-    least = np.inf
+    so_far = {side: _eased(touches[side], middles[side], response.legs[side].foot) for side in touches}
+    settled, least = response, np.inf
     for _ in range(ONE_PIECE_PASSES if touches else 0):
-        so_far = {side: _eased(response.legs[side].foot, middles[side], touches[side]) for side in touches}
-        following = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
+        response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
         moves = [
-            (carried(following.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]))[touches[side]]
+            (carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]))[touches[side]]
             for side in touches
         ]
         largest = max(float(np.abs(move).max()) for move in moves)
-        if largest >= least:
-            break
-        response, least = following, largest
+        settled, least = (response, largest) if largest < least else (settled, least)
         if largest < IN_PLACE * motion.leg_length:
             break
-    return response
+        so_far = {
+            side: _eased(touches[side], middles[side], so_far[side], response.legs[side].foot) for side in touches
+        }
+    return settled
 
 
-def _eased(carry: Array, middle: Array, touching: Mask) -> Array:
-    """Displacements (F, 4, 4) of a foot with its middle at (F, 3) in its contacts, passing smoothly between them."""
-    turns, moves = rotation_vectors(carry[:, :3, :3]), carried(carry, middle) - middle
+def _eased(touching: Mask, middle: Array, *carries: Array) -> Array:
+    """The mean of displacements (F, 4, 4) of a foot with its middle at (F, 3) in its contacts, passing smoothly between
+    them."""
+    turns = np.mean([rotation_vectors(carry[:, :3, :3]) for carry in carries], axis=0)
+    moves = np.mean([carried(carry, middle) - middle for carry in carries], axis=0)
     turns, moves = (
         np.stack([between_contacts(each[:, i], touching) for i in range(3)], axis=-1) for each in (turns, moves)
     )

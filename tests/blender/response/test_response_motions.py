@@ -72,9 +72,19 @@ def put_ground(scene, motion, shape):
     scene.view_layers[0].update()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", GROUNDS)
-@pytest.mark.parametrize("name", [*shots.MOTION_FILES, "walker"])
+LONG = {"zombie", "jumping", "dance"}
+"""Motions whose bakes take ten seconds and more: on the flat in the slow tests, on the other grounds in the marathon."""
+
+
+def cases():
+    """Each motion on each ground."""
+    for name in [*shots.MOTION_FILES, "walker"]:
+        for kind in GROUNDS:
+            rare = name in LONG and kind != "flat snow"
+            yield pytest.param(name, kind, marks=pytest.mark.marathon if rare else pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("name", "kind"), cases())
 def test_standing_soles_lie_on_the_ground_legs_reach_and_knees_do_not_flip(scene, name, kind):
     shape, material = GROUNDS[kind]
     armature = shots.walker(scene, frames=120) if name == "walker" else shots.import_motion(name)
