@@ -13,13 +13,13 @@ from ...core.numerics.rigid import unit
 from ...core.numerics.slices import Slices
 from ...core.rig.bare_body import BareBody, with_toes
 from ...core.rig.bones import RigBones
-from ...core.rig.mapping import RigMapping, bones_of
+from ...core.rig.mapping import RigMapping, SoleSource, bones_of
 from ...core.rig.recording import Recording
 from ...core.rig.rig_skin import FollowedSkin, RigSkin, followed_skin
 from ...core.rig.skin_mass import skin_mass
 from ...core.rig.skin_stances import UNDERSIDE
 from ...core.rig.sole_extraction import bone_families
-from ...core.settings import ObjectName, SoleSource
+from ...core.settings import ObjectName
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
