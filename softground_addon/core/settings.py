@@ -23,6 +23,9 @@ from .rig.mapping import SoleSource
 from .rig.recording import SceneUnits
 from .weather.felt_weather import FeltWeather
 
+TIME_LIMIT = "Time Limit in Advanced > Mesh and Look, or --set longest_bake=N"
+"""By what the user sets `BakeSettings.longest_bake_s`."""
+
 
 class Acts(IntEnum):
     """First stage that a setting acts on, in the order of a bake: a later one leaves what came before as it is."""
