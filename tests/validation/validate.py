@@ -17,6 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from library.softground.scoring import PointScore, plates_saw_everything, score, score_points
+from library.softground.trials import Trial, motion_of_trial, read_marked, read_trial
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
@@ -25,9 +27,7 @@ from softground_addon.core.loads.estimate import ForceModel, estimate_loads
 from softground_addon.core.loads.free_moments import free_moments
 from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.plots import plot_trial
-from tests.validation.scoring import PointScore, plates_saw_everything, score, score_points
 from tests.validation.through_blender import motion_of_bvh
-from tests.validation.trials import Trial, motion_of_trial, read_c3d, read_trial
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("build"), help="folder for validation.json and the plots")
     options = parser.parse_args()
     trials = [read_trial(csv) for csv in sorted(options.directory.glob("*.csv"))]
-    trials += [read_c3d(file) for file in sorted(options.directory.glob("*.[cC]3[dD]"))]
+    trials += [read_marked(file) for file in sorted(options.directory.glob("*.[cC]3[dD]"))]
     if not trials:
         parser.error(
             f"{options.directory} holds no trial: give a folder of C3D files, or of NAME.csv, .json and .bvh files"

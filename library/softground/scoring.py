@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.numerics.intervals import runs
+from ._core.numerics.intervals import runs
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

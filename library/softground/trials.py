@@ -5,27 +5,25 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.capture import c3d
-from softground_addon.core.capture.captured import Plate, bridged
-from softground_addon.core.capture.joint_centres import CapturedBody, captured_body
-from softground_addon.core.motion.motion import JOINTS, CharacterMotion
-from softground_addon.core.motion.sole_motion import Sole, SoleMotion
-from softground_addon.core.numerics.intervals import runs
-from tests.core.capture.free_moments import free_moment
-from tests.validation.scoring import LOADED
+from ._core.capture import c3d
+from ._core.capture.captured import Plate, bridged
+from ._core.capture.joint_centres import CapturedBody, captured_body
+from ._core.errors import InputError
+from ._core.motion.motion import CharacterMotion
+from ._core.numerics.intervals import runs
+from .markers import SIDES, motion_of_markers
+from .readers import c3d_mass, content_of
+from .scoring import LOADED
 
 Array = NDArray[np.float64]
 
-SIDES = ("l", "r")
-LANDMARKS = ("heel", "ball", "toe")
 CSV_JOINTS = {"mid_hip": "hips"}
 """Joints that the files call otherwise than `JOINTS`."""
-MASSES = ("BODYMASS", "MASS", "WEIGHT")
-"""Parameters of a C3D file that hold the subject's mass [kg]."""
 KINDS = {"walk": "walk", "run": "run", "dj": "drop jump", "jump": "jump", "squat": "squat", "sts": "chair"}
 """Kinds of motion by a word in a trial's name; where there is none, the name says nothing ("other")."""
 
@@ -76,7 +74,7 @@ class Trial:
 
 def read_trial(csv: Path) -> Trial:
     """The trial whose three files share the name of `csv`; gaps of the markers are bridged, lost forces are none."""
-    about = json.loads(csv.with_suffix(".json").read_text())
+    about = _about(csv.with_suffix(".json"))
     table = np.genfromtxt(csv, delimiter=",", names=True)
 
     def vectors(name: str) -> Array:
@@ -93,28 +91,36 @@ def read_trial(csv: Path) -> Trial:
     )
 
 
-def read_c3d(path: Path) -> Trial:
+def read_marked(path: Path) -> Trial:
     """The trial in a C3D file with markers and plates; a `NAME.json` beside it with `mass_kg` comes before its own.
 
     A plate that is stepped on is taken to bear the foot that is nearest to its centre of pressure during that step.
     """
-    content = path.read_bytes()
+    content = content_of(path)
     body = captured_body(c3d.read(content))
     forces, centres, moments = _measured_on_feet(body)
     bvh = path.with_suffix(".bvh")
     return Trial(path.stem, _mass(path, content), body.rate, body.joints, forces, bvh, centres, moments)
 
 
+def _about(path: Path) -> dict[str, Any]:
+    """What the file beside a trial says."""
+    try:
+        about = json.loads(path.read_text(encoding="utf-8"))
+        return {**about, "mass_kg": float(about["mass_kg"])}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise InputError(
+            f'{path} cannot be read ({error}): it must be a table such as {{"mass_kg": 70, "rate_hz": 100}}'
+        ) from error
+
+
 def _mass(path: Path, content: bytes) -> float:
     """Body mass [kg] by the file beside the trial, else by the trial's parameters."""
     about = path.with_suffix(".json")
-    if about.exists():
-        return float(json.loads(about.read_text())["mass_kg"])
-    values = c3d._parameters(content)[0].values
-    masses = [value for (_, name), value in values.items() if name in MASSES and isinstance(value, np.ndarray)]
-    if not masses or not masses[0].size or not masses[0].flat[0] > 0:
-        raise SystemExit(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
-    return float(masses[0].flat[0])
+    mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content)
+    if mass is None:
+        raise InputError(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
+    return mass
 
 
 def _measured_on_feet(body: CapturedBody) -> tuple[Array, Array, Array]:
@@ -142,6 +148,12 @@ def _measured_on_feet(body: CapturedBody) -> tuple[Array, Array, Array]:
     return forces, centres, moments
 
 
+def free_moment(plate: Plate) -> Array:
+    """Moment of a plate about its normal at the centre of pressure, (S,) [N·m]; NaN where nothing presses."""
+    arm = plate.centre_of_pressure() - plate.corners.mean(axis=0)
+    return np.asarray((plate.moment - np.cross(arm, plate.force)) @ plate.normal)
+
+
 def _at_frames(plate: Plate, rate: float, count: int) -> Plate:
     """A plate whose samples are averaged over each frame."""
     samples = max(round(plate.rate / rate), 1)
@@ -158,46 +170,6 @@ def _distance(body: CapturedBody, side: str, place: Array, step: slice) -> Array
 
 
 def motion_of_trial(trial: Trial) -> CharacterMotion:
-    """The motion of the joint centres, with a sole below the heel, ball and toe markers of each foot.
-
-    Markers sit on skin or shoe, each some centimetres above the sole: a landmark is put below its marker by the
-    marker's own height while the foot is on the ground, a low percentile over the trial.
-    """
-    joints = {CSV_JOINTS.get(name, name): path for name, path in trial.points.items()}
-    return CharacterMotion(
-        name=trial.name,
-        mass=trial.mass,
-        leg_length=_leg_length(trial),
-        frames=np.arange(len(trial.forces), dtype=float),
-        frame_rate=trial.rate,
-        soles=tuple(_sole(trial, side) for side in SIDES),
-        joints={name: path for name, path in joints.items() if name in JOINTS},
-    )
-
-
-def _leg_length(trial: Trial) -> float:
-    """Thigh, shank and ankle height, the mean of both legs [m]."""
-
-    def between(a: str, b: str, side: str) -> float:
-        return float(np.median(np.linalg.norm(trial.points[f"{a}_{side}"] - trial.points[f"{b}_{side}"], axis=-1)))
-
-    return float(
-        np.mean(
-            [
-                between("hip", "knee", side)
-                + between("knee", "ankle", side)
-                + np.percentile(trial.points[f"ankle_{side}"][:, 2], 5)
-                for side in SIDES
-            ]
-        )
-    )
-
-
-def _sole(trial: Trial, side: str) -> SoleMotion:
-    markers = np.stack([trial.points[f"{landmark}_{side}"] for landmark in LANDMARKS], axis=1)
-    transforms = np.tile(np.eye(4), (*markers.shape[:2], 1, 1))
-    transforms[..., :3, 3] = markers
-    landmarks = np.zeros((len(LANDMARKS), 3))
-    landmarks[:, 2] = -np.percentile(markers[..., 2], 5, axis=0)
-    sole = Sole(f"foot.{side.upper()}", side.upper(), (), landmarks, np.arange(len(LANDMARKS)), np.zeros((0, 2)))
-    return SoleMotion(sole, transforms)
+    """The motion of a trial's joint centres; see `motion_of_markers`."""
+    points = {CSV_JOINTS.get(name, name): path for name, path in trial.points.items()}
+    return motion_of_markers(points, trial.rate, mass=trial.mass, name=trial.name)
