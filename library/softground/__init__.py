@@ -31,6 +31,7 @@ from ._core.ground.heightfield import Terrain
 from ._core.ground.material import GroundMaterial
 from .body import Body
 from .forces import Loads, SoleLoads, estimate_loads
+from .plates import PlateLoads, plates_on_feet
 from .prints import Ground, Print, Prints, presets, press, snow
 from .readers import read_amass, read_bvh, read_c3d, read_trc
 from .tables import to_csv, to_opensim
@@ -43,6 +44,7 @@ __all__ = [
     "GroundMaterial",
     "InputError",
     "Loads",
+    "PlateLoads",
     "Print",
     "Prints",
     "Skeleton",
@@ -50,6 +52,7 @@ __all__ = [
     "SoleLoads",
     "Terrain",
     "estimate_loads",
+    "plates_on_feet",
     "presets",
     "press",
     "read_amass",

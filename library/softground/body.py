@@ -38,7 +38,7 @@ _POSES = 24
 
 @dataclass(frozen=True)
 class Body:
-    """A body in motion.
+    """A body in motion: [s], [m], [kg], Z up.
 
     Attributes
     ----------

@@ -111,9 +111,9 @@ class Prints:
 
     def heights(self, x: ArrayLike, y: ArrayLike, time: float = np.inf) -> Array:
         """Heights of the ground at places [m], arrays of one shape, at a time [s]; after all steps if not given."""
-        places = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        across, along = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         history = GroundHistory(self.terrain, self.record)
-        return history.heights(*places, np.full(places[0].shape, time * self.rate))
+        return history.heights(across, along, np.full(across.shape, time * self.rate))
 
     def grid(self, time: float = np.inf) -> tuple[Array, Array, Array]:
         """The cells around all prints: x (C,) and y (R,) of their centres, heights (R, C) at a time [s]; all in [m]."""
@@ -124,7 +124,7 @@ class Prints:
             np.arange(round((b - a) / self.cell_size)) * self.cell_size + a + self.cell_size / 2
             for a, b in zip(low, high, strict=True)
         )
-        return x, y, self.heights(*np.meshgrid(x, y), time)
+        return x, y, self.heights(x[None], y[:, None], time)
 
     @property
     def volumes(self) -> tuple[float, float]:
@@ -176,7 +176,7 @@ def presets() -> dict[str, GroundMaterial]:
     Examples
     --------
     >>> sorted(presets())[:2]
-    ['Clayey Soil', 'Crust over Powder']
+    ['Clayey Soil (field)', 'Crust over Powder']
     """
     return {name: presets_of_core.find(name).material for name in presets_of_core.names()}
 

@@ -52,12 +52,41 @@ def read_c3d(path: PathLike, *, mass: float | None = None, up: str | None = None
 
 
 def read_trc(path: PathLike, *, mass: float | None = None, up: str | None = None) -> Body:
-    """The body in a TRC file of markers; as `read_c3d`, without plates and mass."""
+    """The body in a TRC file of markers.
+
+    Parameters
+    ----------
+    path : path
+    mass : float, optional
+        [kg]; that of a person of this size if not given.
+    up : str, optional
+        As for `read_c3d`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or holds no markers of two legs.
+
+    References
+    ----------
+    OpenSim documentation, "Marker (.trc) Files".
+    """
     return _marked(path, trc.read(content_of(path)), mass, up)
 
 
 def read_amass(path: PathLike, *, mass: float | None = None) -> Body:
-    """The body in an AMASS archive of SMPL poses, of average proportions; as `read_c3d`.
+    """The body in an AMASS archive of SMPL poses, of average proportions.
+
+    Parameters
+    ----------
+    path : path
+    mass : float, optional
+        [kg]; that of a person of this size if not given.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is no such archive.
 
     References
     ----------

@@ -57,6 +57,11 @@ def to_opensim(loads: Loads, path: str | os.PathLike[str]) -> list[Path]:
 def to_csv(result: Loads | Prints, path: str | os.PathLike[str]) -> Path:
     """Write a table: of loads a row for each frame, of prints a row for each; units are in its head.
 
+    Parameters
+    ----------
+    result : Loads or Prints
+    path : path
+
     Raises
     ------
     InputError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core.capture import c3d
-from ._core.capture.captured import Plate, bridged
-from ._core.capture.joint_centres import CapturedBody, captured_body
+from ._core.capture.captured import bridged
+from ._core.capture.joint_centres import captured_body
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
-from ._core.numerics.intervals import runs
+from .body import Body
 from .markers import SIDES, motion_of_markers
+from .plates import plates_on_feet
 from .readers import c3d_mass, content_of
-from .scoring import LOADED
 
 Array = NDArray[np.float64]
 
@@ -73,18 +74,29 @@ class Trial:
 
 
 def read_trial(csv: Path) -> Trial:
-    """The trial whose three files share the name of `csv`; gaps of the markers are bridged, lost forces are none."""
-    about = _about(csv.with_suffix(".json"))
-    table = np.genfromtxt(csv, delimiter=",", names=True)
+    """The trial whose three files share the name of `csv`; gaps of the markers are bridged, lost forces are none.
 
+    Raises
+    ------
+    InputError
+        If a file is missing, or lacks what a trial has.
+    """
+    about = _about(csv.with_suffix(".json"))
+    try:
+        return _of_table(csv, about, np.genfromtxt(csv, delimiter=",", names=True))
+    except (OSError, KeyError, ValueError) as error:
+        raise InputError(f"{csv} is no trial ({error}): it needs <joint>_<x|y|z> and grf_<l|r>_<x|y|z>") from error
+
+
+def _of_table(csv: Path, about: Mapping[str, Any], table: NDArray[Any]) -> Trial:
     def vectors(name: str) -> Array:
         return np.stack([table[f"{name}_{axis}"] for axis in "xyz"], axis=-1)
 
-    names = [column[:-2] for column in table.dtype.names if column.endswith("_x")]
+    names = [column[:-2] for column in table.dtype.names or () if column.endswith("_x")]
     return Trial(
         csv.stem,
         about["mass_kg"],
-        about["rate_hz"],
+        float(about["rate_hz"]),
         {name: bridged(vectors(name)) for name in names if not name.startswith("grf_")},
         np.nan_to_num(np.stack([vectors(f"grf_{side}") for side in SIDES], axis=1)),
         csv.with_suffix(".bvh"),
@@ -92,15 +104,24 @@ def read_trial(csv: Path) -> Trial:
 
 
 def read_marked(path: Path) -> Trial:
-    """The trial in a C3D file with markers and plates; a `NAME.json` beside it with `mass_kg` comes before its own.
-
-    A plate that is stepped on is taken to bear the foot that is nearest to its centre of pressure during that step.
-    """
-    content = content_of(path)
-    body = captured_body(c3d.read(content))
-    forces, centres, moments = _measured_on_feet(body)
-    bvh = path.with_suffix(".bvh")
-    return Trial(path.stem, _mass(path, content), body.rate, body.joints, forces, bvh, centres, moments)
+    """The trial in a C3D file with markers and plates; a `NAME.json` beside it with `mass_kg` comes before its own."""
+    about = path.with_suffix(".json")
+    mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content_of(path))
+    if mass is None:
+        raise InputError(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
+    captured = captured_body(c3d.read(content_of(path)))
+    body = Body.from_joints(captured.joints, captured.rate, mass=mass, name=path.stem, plates=captured.plates)
+    shown = plates_on_feet(body)
+    return Trial(
+        path.stem,
+        mass,
+        body.rate,
+        captured.joints,
+        shown.force,
+        path.with_suffix(".bvh"),
+        shown.centre_of_pressure,
+        shown.free_moment,
+    )
 
 
 def _about(path: Path) -> dict[str, Any]:
@@ -112,61 +133,6 @@ def _about(path: Path) -> dict[str, Any]:
         raise InputError(
             f'{path} cannot be read ({error}): it must be a table such as {{"mass_kg": 70, "rate_hz": 100}}'
         ) from error
-
-
-def _mass(path: Path, content: bytes) -> float:
-    """Body mass [kg] by the file beside the trial, else by the trial's parameters."""
-    about = path.with_suffix(".json")
-    mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content)
-    if mass is None:
-        raise InputError(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
-    return mass
-
-
-def _measured_on_feet(body: CapturedBody) -> tuple[Array, Array, Array]:
-    """What the plates show of the left and the right foot at the frames of the markers.
-
-    Returns
-    -------
-    forces : (F, 2, 3) float array [N]
-    centres : (F, 2, 3) float array [m], NaN but where one plate bears the foot
-    free_moments : (F, 2) float array [N·m], likewise
-    """
-    count = len(body.joints["heel_l"])
-    forces, plates = np.zeros((count, len(SIDES), 3)), np.zeros((count, len(SIDES)))
-    centres, moments = np.full((count, len(SIDES), 3), np.nan), np.full((count, len(SIDES)), np.nan)
-    for plate in body.plates:
-        averaged = _at_frames(plate, body.rate, count)
-        force, centre, moment = averaged.force, averaged.centre_of_pressure(), free_moment(averaged)
-        for first, last in zip(*runs(force[:, 2] > LOADED), strict=True):
-            step = slice(first, last)
-            foot = np.argmin([np.nanmean(_distance(body, side, centre[step], step)) for side in SIDES])
-            forces[step, foot] += force[step]
-            plates[step, foot] += 1
-            centres[step, foot], moments[step, foot] = centre[step], moment[step]
-    centres[plates != 1], moments[plates != 1] = np.nan, np.nan
-    return forces, centres, moments
-
-
-def free_moment(plate: Plate) -> Array:
-    """Moment of a plate about its normal at the centre of pressure, (S,) [N·m]; NaN where nothing presses."""
-    arm = plate.centre_of_pressure() - plate.corners.mean(axis=0)
-    return np.asarray((plate.moment - np.cross(arm, plate.force)) @ plate.normal)
-
-
-def _at_frames(plate: Plate, rate: float, count: int) -> Plate:
-    """A plate whose samples are averaged over each frame."""
-    samples = max(round(plate.rate / rate), 1)
-    frames = [
-        values[: count * samples].reshape(count, samples, 3).mean(axis=1) for values in (plate.force, plate.moment)
-    ]
-    return Plate(plate.corners, rate, *frames)
-
-
-def _distance(body: CapturedBody, side: str, place: Array, step: slice) -> Array:
-    """Along the ground from the middle of a foot, (F,) [m]."""
-    middle = (body.joints[f"heel_{side}"][step] + body.joints[f"ball_{side}"][step]) / 2
-    return np.asarray(np.linalg.norm((place - middle)[:, :2], axis=1))
 
 
 def motion_of_trial(trial: Trial) -> CharacterMotion:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from library.softground.trials import free_moment
+from library.softground.plates import free_moment
 from softground_addon.core.capture import c3d
 from softground_addon.core.errors import InputError
 from tests.core.capture.c3d_files import DEC, INTEL, SGI, c3d_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from library.softground.trials import free_moment
+from library.softground.plates import free_moment
 from softground_addon.core.capture import trc
 from softground_addon.core.capture.captured import Capture, Plate
 from softground_addon.core.capture.joint_centres import UPWARD, captured_body
