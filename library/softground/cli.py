@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--level", type=float, default=0.0, metavar="M", help="height of the level ground [m]")
     validating = commands.add_parser("validate", help="forces against force plates", description=validate.__doc__)
     validating.set_defaults(run=_validate)
-    validating.add_argument("directory", type=Path, help="folder of NAME.c3d, or of NAME.csv, NAME.json and NAME.bvh")
+    validating.add_argument("directory", type=Path, help="folder of C3D files, of TRC and MOT, or of CSV and JSON")
     validating.add_argument("--report", type=Path, metavar="FILE.json", help="write the table as JSON")
     return parser
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core.capture import c3d
+from ._core.capture import c3d, trc
 from ._core.capture.captured import bridged
 from ._core.capture.joint_centres import captured_body
 from ._core.errors import InputError
@@ -20,6 +20,7 @@ from .body import Body
 from .markers import SIDES, motion_of_markers
 from .plates import plates_on_feet
 from .readers import c3d_mass, content_of
+from .storage import first_time, forces_beside, plates_of
 
 Array = NDArray[np.float64]
 
@@ -104,13 +105,24 @@ def _of_table(csv: Path, about: Mapping[str, Any], table: NDArray[Any]) -> Trial
 
 
 def read_marked(path: Path) -> Trial:
-    """The trial in a C3D file with markers and plates; a `NAME.json` beside it with `mass_kg` comes before its own."""
+    """The trial in a C3D file with plates, or in a TRC file with a table of forces beside it (`storage.forces_beside`).
+
+    A `NAME.json` beside it with `mass_kg` comes before what the file says of the mass.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or nothing tells the mass.
+    """
+    content, is_c3d = content_of(path), path.suffix.lower() == ".c3d"
     about = path.with_suffix(".json")
-    mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content_of(path))
+    mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content) if is_c3d else None
     if mass is None:
         raise InputError(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
-    captured = captured_body(c3d.read(content_of(path)))
-    body = Body.from_joints(captured.joints, captured.rate, mass=mass, name=path.stem, plates=captured.plates)
+    captured = captured_body(c3d.read(content)) if is_c3d else captured_body(trc.read(content), "Y")
+    table = None if is_c3d else forces_beside(path)
+    plates = plates_of(table, first_time(content)) if table else captured.plates
+    body = Body.from_joints(captured.joints, captured.rate, mass=mass, name=path.stem, plates=plates)
     shown = plates_on_feet(body)
     return Trial(
         path.stem,

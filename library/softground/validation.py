@@ -17,6 +17,7 @@ from .body import GRAVITY, Body
 from .forces import Loads, estimate_loads
 from .readers import read_bvh
 from .scoring import PointScore, plates_saw_everything, score, score_points
+from .storage import forces_beside
 from .trials import Trial, motion_of_trial, read_marked, read_trial
 
 Array = NDArray[np.float64]
@@ -85,7 +86,9 @@ class Told:
 
 
 def read_trials(directory: Path) -> list[Trial]:
-    """The trials of a folder: C3D files, or NAME.csv and NAME.json; a NAME.bvh beside either is the same motion.
+    """The trials of a folder: C3D files, TRC files with forces, or NAME.csv and NAME.json.
+
+    A NAME.bvh beside either is the same motion.
 
     Raises
     ------
@@ -93,10 +96,13 @@ def read_trials(directory: Path) -> list[Trial]:
         If there is none, or one cannot be read.
     """
     trials = [read_trial(csv) for csv in sorted(directory.glob("*.csv"))]
-    trials += [read_marked(file) for file in sorted(directory.glob("*.[cC]3[dD]"))]
+    marked = sorted(directory.glob("*.[cC]3[dD]"))
+    marked += [file for file in sorted(directory.glob("*.[tT][rR][cC]")) if forces_beside(file)]
+    trials += [read_marked(file) for file in marked]
     if not trials:
         raise InputError(
-            f"{directory} holds no trial: give a folder of C3D files, or of NAME.csv, .json and .bvh files"
+            f"{directory} holds no trial: give a folder of C3D files, of TRC files with forces as NAME_grf.mot, or of "
+            "NAME.csv, .json and .bvh files"
         )
     return trials
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import doctest
 import inspect
+import json
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,7 +15,10 @@ import pytest
 
 from library import softground
 from library.softground import prints as prints_module
+from library.softground import storage
 from library.softground.cli import main
+from library.softground.plates import free_moment
+from softground_addon.core.capture.joint_centres import UPWARD
 from softground_addon.core.ground.hand_hardness import snow as snow_of_core
 from softground_addon.core.ground.heightfield import SlopingTerrain
 from softground_addon.core.loads import estimate
@@ -251,6 +255,43 @@ def test_opensim_reads_forces_with_y_up_and_the_bodies_that_they_act_on(loads, t
     assert row["ground_foot_L_py"] == pytest.approx(0.0, abs=1e-6)
     forces = ElementTree.parse(external).iter("ExternalForce")
     assert [force.find("applied_to_body").text for force in forces] == ["calcn_l", "calcn_r"]
+
+
+def test_trials_as_opensim_users_lay_them_out_are_read(loads, tmp_path, capsys):
+    """Forces that the library wrote itself, as those of plates: against them it has no error but of rounding."""
+    markers = {name: np.tile(path[:1], (60, 1)) for name, path in centres().items()}
+    turned = {name: path @ UPWARD["Y"] for name, path in markers.items()}  # Y up
+    (tmp_path / "anna_walk.trc").write_bytes(trc_file(turned, frames=60))
+    softground.to_opensim(loads, tmp_path / "anna_walk_grf.mot")
+    assert main(["validate", str(tmp_path)]) == 2
+    assert "anna_walk.json" in capsys.readouterr().err
+    (tmp_path / "anna_walk.json").write_text('{"mass_kg": 70}')
+    report = tmp_path / "scores.json"
+    assert main(["validate", str(tmp_path), "--report", str(report)]) == 0
+    (row,) = json.loads(report.read_text())
+    assert (row["trial"], row["path"], row["frames_scored"]) == ("anna_walk", "joints", 60)
+    assert row["rms_bw_foot"] < 1e-5
+    assert row["rms_bw_foot_anterior_posterior"] < 1e-5
+    assert row["rms_centre_mm"] < 0.1
+    assert row["rms_free_moment_nm"] < 1e-3
+
+
+def test_forces_of_plates_by_their_usual_names_are_turned_with_the_markers(tmp_path):
+    """By hand: 600 N up and 50 N along x at (0.1, 0, -0.2) with Y up, which is (0.1, 0.2, 0) with Z up."""
+    path = tmp_path / "walk_forces.mot"
+    labels = ["time", *(f"R_ground_force_{kind}{axis}" for kind in "vp" for axis in "xyz")]
+    labels += [f"R_ground_torque_{axis}" for axis in "xyz"]
+    row = [50.0, 600.0, 0.0, 0.1, 0.0, -0.2, 0.0, 3.0, 0.0]
+    lines = ["forces", "version=1", "endheader", "\t".join(labels)]
+    lines += ["\t".join(map(str, [time, *row])) for time in np.arange(0.5, 1.0, 0.001).round(6)]
+    path.write_text("\n".join(lines))
+    assert storage.forces_beside(tmp_path / "walk.trc") == path
+    (plate,) = storage.plates_of(path, 0.6)
+    assert plate.rate == pytest.approx(1000.0)
+    assert len(plate.force) == 400
+    np.testing.assert_allclose(plate.force[7], (50, 0, 600), atol=1e-9)
+    np.testing.assert_allclose(plate.centre_of_pressure()[7], (0.1, 0.2, 0.0), atol=1e-9)
+    np.testing.assert_allclose(free_moment(plate)[7], 3.0, atol=1e-9)
 
 
 def refusals():
