@@ -32,6 +32,8 @@ GRAVITY = 9.81
 """[m/s²]"""
 
 _NEEDED = tuple(f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle", "heel", "ball", "toe"))
+_FARTHEST = 1e6
+"""Largest coordinate [m]."""
 _POSES = 24
 """Poses by which the parts of a mesh that move together are found."""
 
@@ -116,8 +118,8 @@ class Body:
         count = len(paths[_NEEDED[0]])
         check_length(count, rate)
         wrong = [joint for joint, path in paths.items() if path.shape != (count, 3) or not np.isfinite(path).all()]
-        if wrong or count < 2:
-            raise InputError(f"the path of {(wrong or _NEEDED)[0]} is not numbers of the shape ({max(count, 2)}, 3)")
+        if wrong:
+            raise InputError(f"the path of {wrong[0]} is not numbers of the shape ({count}, 3)")
         paths.setdefault("hips", (paths["hip_l"] + paths["hip_r"]) / 2)
         skeleton = skeleton_of(CapturedBody(paths, rate))
         body = cls.from_skeleton(skeleton, mass=mass, name=name, plates=plates)
@@ -151,6 +153,10 @@ class Body:
         """
         check_length(len(skeleton.poses), skeleton.rate)
         bones = rest_bones(skeleton)
+        if not (np.abs(skeleton.poses) < _FARTHEST).all() or len(skeleton.poses) < 2:
+            raise InputError(
+                f"the poses of '{name}' are fewer than two, no numbers, or farther than {_FARTHEST:,.0f} m"
+            )
         mapping = map_by_names(bones, bones.keys()) if joints is None else _mapped(joints)
         if mapping is None or not mapping.soles:
             raise InputError(

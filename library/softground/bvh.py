@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 _SHORTEST = 1e-3
 """Bones shorter than this, in units of the file, point along y."""
 
+_FARTHEST = 1e9
+"""An offset has smaller numbers, in units of the file."""
+
 
 @dataclass
 class _Joint:
@@ -78,7 +81,10 @@ def _joints(words: list[str]) -> list[_Joint]:
         word = words[place]
         if word in ("ROOT", "JOINT"):
             begin = words.index("{", place)
-            joints.append(_Joint(" ".join(words[place + 1 : begin]), above[-1] if above else -1))
+            name = " ".join(words[place + 1 : begin])
+            taken = {joint.name for joint in joints}
+            name = next(each for each in (name, *(f"{name}.{n}" for n in range(1, 10_000))) if each not in taken)
+            joints.append(_Joint(name, above[-1] if above else -1))
             above.append(len(joints) - 1)
             place = begin
         elif word == "End":
@@ -89,7 +95,7 @@ def _joints(words: list[str]) -> list[_Joint]:
             joints[above[-1]].offset = np.array(words[place + 1 : place + 4], dtype=float)
             place += 3
         elif word == "CHANNELS":
-            count = int(words[place + 1])
+            count = max(int(words[place + 1]), 0)
             joints[above[-1]].channels = tuple(words[place + 2 : place + 2 + count])
             place += 1 + count
         elif word == "}":
@@ -98,6 +104,9 @@ def _joints(words: list[str]) -> list[_Joint]:
     kinds = {f"{axis}{kind}" for axis in "XYZ" for kind in ("position", "rotation")}
     if not joints or any(channel not in kinds for joint in joints for channel in joint.channels):
         raise ValueError("its joints or channels have no known names")
+    ends = [joint.offset if joint.end is None else joint.offset + joint.end for joint in joints]
+    if any(end.shape != (3,) or not np.abs(end).max() < _FARTHEST for end in ends):
+        raise ValueError("its offsets are no numbers")
     return joints
 
 

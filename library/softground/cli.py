@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -35,14 +37,15 @@ READERS: dict[str, Callable[..., Body]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; returns the exit code: 0 done, 2 bad input, 3 a check failed, 130 interrupted."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may know few letters
     try:
         options = _parser().parse_args(arguments)
         options.run(options)
     except SystemExit as leaving:  # argparse has printed its message
         return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
     except BrokenPipeError:  # as before `| head`
-        sys.stderr.close()
-        return EXIT_DONE
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except SoftGroundError as error:
         print(f"softground: {error}", file=sys.stderr)
         return EXIT_FAILED_CHECK if isinstance(error, BakeError) else EXIT_BAD_INPUT

@@ -325,12 +325,32 @@ def test_a_ground_on_another_terrain_than_its_loads_is_refused(loads):
         softground.press(loads, softground.Ground(SNOW), cell_size=0.0)
 
 
-@pytest.mark.parametrize("damage", [lambda t: t[:400], lambda t: t.replace("Xrotation", "Xturn"), lambda t: t + " x"])
+DAMAGES = {
+    "cut short": ("MOTION", "MOTION\nFrames: 9\nFrame Time: 0.04\n"),
+    "unknown channels": ("Xrotation", "Xturn"),
+    "a word among the numbers": ("0.0333333", "0.0333333 x"),
+    "channels counted backward": ("CHANNELS 3", "CHANNELS -5"),
+    "offsets that are no numbers": ("OFFSET 20 40 0", "OFFSET nan 40 0"),
+    "a body at infinity": ("100 92 0", "1e300 92 0"),
+    "no time": ("Frame Time", "Frame"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_bvh_is_refused_in_a_sentence(tmp_path, damage):
     path = bvh(tmp_path)
-    path.write_text(damage(path.read_text()))
-    with pytest.raises(softground.InputError, match="BVH"):
+    assert DAMAGES[damage][0] in path.read_text()
+    path.write_text(path.read_text().replace(*DAMAGES[damage]))
+    with pytest.raises(softground.InputError, match=r"BVH|'figure' has"):
         softground.read_bvh(path)
+
+
+def test_bones_of_one_name_are_told_apart(tmp_path):
+    path = bvh(tmp_path, stands=20)
+    path.write_text(path.read_text().replace("Spine", "Hips"))
+    body = softground.read_bvh(path, mass=MASS, scale=0.01)
+    np.testing.assert_allclose(body.motion.joints["hips"][0], (0, 0, 0.92), atol=1e-6)
+    np.testing.assert_allclose(body.motion.joints["elbow_l"][0], (0.5, 0, 1.42), atol=1e-6)
 
 
 def test_the_command_tells_forces_presses_and_leaves_with_the_extension_s_codes(tmp_path, capsys):
