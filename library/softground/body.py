@@ -154,9 +154,7 @@ class Body:
         check_length(len(skeleton.poses), skeleton.rate)
         bones = rest_bones(skeleton)
         if not (np.abs(skeleton.poses) < _FARTHEST).all() or len(skeleton.poses) < 2:
-            raise InputError(
-                f"the poses of '{name}' are fewer than two, no numbers, or farther than {_FARTHEST:,.0f} m"
-            )
+            raise InputError(f"'{name}' has fewer than two poses, or some that are no numbers up to {_FARTHEST:,.0f} m")
         mapping = map_by_names(bones, bones.keys()) if joints is None else _mapped(joints)
         if mapping is None or not mapping.soles:
             raise InputError(

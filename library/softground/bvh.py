@@ -95,7 +95,9 @@ def _joints(words: list[str]) -> list[_Joint]:
             joints[above[-1]].offset = np.array(words[place + 1 : place + 4], dtype=float)
             place += 3
         elif word == "CHANNELS":
-            count = max(int(words[place + 1]), 0)
+            count = int(words[place + 1])
+            if count < 0:
+                raise ValueError(f"a joint of {count} channels")
             joints[above[-1]].channels = tuple(words[place + 2 : place + 2 + count])
             place += 1 + count
         elif word == "}":
