@@ -178,7 +178,8 @@ def presets() -> dict[str, GroundMaterial]:
     >>> sorted(presets())[:2]
     ['Clayey Soil (field)', 'Crust over Powder']
     """
-    return {name: presets_of_core.find(name).material for name in presets_of_core.names()}
+    every = map(presets_of_core.load, sorted(presets_of_core.FOLDER.glob("*.json")))
+    return {preset.name: preset.material for preset in every}
 
 
 def press(

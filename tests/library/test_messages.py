@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
-import tomllib
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-WHEEL = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
-MODULES = sorted(
-    module
-    for part in WHEEL["only-include"]
-    for module in ((ROOT / part).rglob("*.py") if (ROOT / part).is_dir() else [ROOT / part])
-    if module.suffix == ".py" and not module.is_symlink()
-)
+from tests.library.contents import MODULES, ROOT
+
 FEWEST_WORDS = 3
 """A message has at least so many; shorter texts are keys and formats."""
 
