@@ -29,7 +29,7 @@ LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
 ONE_PIECE_PASSES = 32
 """Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
-stand on other points. Each begins midway between where the last one began and ended, as points take turns at bearing."""
+stand on other points. Each begins midway between where the last began and ended, as points take turns at bearing."""
 IN_PLACE = 3e-4
 """Feet that move less than this from one time to the next are where they belong, in leg lengths."""
 

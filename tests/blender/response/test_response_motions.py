@@ -73,18 +73,21 @@ def put_ground(scene, motion, shape):
 
 
 LONG = {"zombie", "jumping", "dance"}
-"""Motions whose bakes take ten seconds and more: on the flat in the slow tests, on the other grounds in the marathon."""
+"""Motions whose bakes take long: on the flat in the slow tests, on the other grounds in the marathon."""
 
 
-def cases():
-    """Each motion on each ground."""
-    for name in [*shots.MOTION_FILES, "walker"]:
-        for kind in GROUNDS:
-            rare = name in LONG and kind != "flat snow"
-            yield pytest.param(name, kind, marks=pytest.mark.marathon if rare else pytest.mark.slow)
+def tier(name, kind):
+    return pytest.mark.marathon if name in LONG and kind != "flat snow" else pytest.mark.slow
 
 
-@pytest.mark.parametrize(("name", "kind"), cases())
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        pytest.param(name, kind, marks=tier(name, kind))
+        for name in [*shots.MOTION_FILES, "walker"]
+        for kind in GROUNDS
+    ],
+)
 def test_standing_soles_lie_on_the_ground_legs_reach_and_knees_do_not_flip(scene, name, kind):
     shape, material = GROUNDS[kind]
     armature = shots.walker(scene, frames=120) if name == "walker" else shots.import_motion(name)
