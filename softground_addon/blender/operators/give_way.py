@@ -1,0 +1,68 @@
+"""*Give Way*: plants and litter of the user's bend under the soles of the bake, and rise again."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import bpy
+from bpy.props import EnumProperty
+
+from ...core.errors import InputError
+from ...core.settings import SceneUnits
+from .. import settings
+from ..ground import baked_ground, ground_mesh, trampled_ground
+from ..operator_base import reports_errors
+from ..plants import give_way, trampling_table
+
+
+class SOFTGROUND_OT_give_way(bpy.types.Operator):
+    """Let the selected plants or litter give way to the feet: hair curves, instances, meshes of loose blades. One
+    modifier behind yours; remove it, and all is as it was"""
+
+    bl_idname = "softground.give_way"
+    bl_label = "Give Way"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(name="Kind", description="What gives way", items=give_way.KINDS, default="MEADOW")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the scene has a ground, and something is selected that may give way."""
+        cls.poll_message_set("Choose a ground, and select plants or litter on it")
+        ground = settings.options_of(context).ground
+        return ground is not None and context.mode == "OBJECT" and bool(_chosen(context, ground))
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        ground = settings.options_of(context).ground
+        chosen = _chosen(context, ground)
+        linked = next((obj for obj in chosen if obj.library or obj.override_library), None)
+        if linked is not None:
+            raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
+        is_new = trampling_table.of(ground) is None
+        table = trampling_table.ensure(ground)
+        if is_new and baked_ground.is_baked(ground):
+            footprints, about = baked_ground.load(ground)
+            units = baked_ground.units_of(about["inputs"])
+            trampled_ground.write(ground, footprints, SceneUnits(**{name: units[name] for name in _UNITS}))
+        for obj in chosen:
+            give_way.put(obj, self.kind, table, {baked_ground.display_mesh_of(ground)})
+        self.report({"INFO"}, f"{len(chosen)} objects give way" if len(chosen) > 1 else f"'{chosen[0].name}' gives way")
+        return {"FINISHED"}
+
+
+_UNITS = [field.name for field in fields(SceneUnits)]
+
+
+def _chosen(context: bpy.types.Context, ground: bpy.types.Object) -> list[bpy.types.Object]:
+    """Selected objects that may give way; a ground only with a scatter of its own."""
+    shown = {ground, baked_ground.display_mesh_of(ground)}
+    return [
+        obj
+        for obj in context.selected_objects
+        if obj.type in give_way.SCATTERS
+        and (obj not in shown or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj)))
+    ]
+
+
+CLASSES = (SOFTGROUND_OT_give_way,)
