@@ -16,8 +16,10 @@ from .trampling_table import modifier_of
 
 MODIFIER = nodes.GROUP
 LITTER = "LITTER"
-KINDS = (*((key, title, f"Plants such as {title.lower()}") for key, (title, _) in PLANTS.items()),
-         (LITTER, "Leaves and Pebbles", "What lies on the ground: it is pressed in and tilts with the prints"))  # fmt: skip
+KINDS = (
+    *((key, title, f"Plants that bend and rise like {title.lower()}") for key, (title, _) in PLANTS.items()),
+    (LITTER, "Leaves and Pebbles", "What lies on the ground, is pressed in, and tilts with the prints"),
+)
 """What gives way, as an enum has it."""
 SCATTERS = ("MESH", "CURVES")
 """Types of objects that give way."""

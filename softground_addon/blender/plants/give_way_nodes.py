@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from ...core.plants.bending import Pass, Plant, bend, cover
+from ...core.plants.bending import Pass, Plant, bend
 from ..node_graph import NodeGraph, Number
 from ..node_modifiers import new_group
 
@@ -24,22 +24,24 @@ MARK = "softground_give_way"
 
 TILES, FIRST, ACTIVE = "softground_tiles", "softground_first", "softground_active"
 TIMES, LEAN, PACE, SINK = "softground_times", "softground_lean", "softground_pace", "softground_sink"
-"""Of each pass: start, end and reach; direction and what lasts; speeds down and up, and its number; height and slope."""
+"""Of each pass: times and reach; direction [rad], what lasts, height above; speeds and number; height and slope."""
 META = "softground_meta"
 """Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first frame."""
 
-BENT, WORN = "softground_bent", "softground_worn"
-"""For materials, of curves, instances and points: from 0 to 1, how far it lies, and the share that is worn down."""
-_ROOT, _TOUCHED, _BEND, _SHIFT = ".softground_root", ".softground_touched", ".softground_bend", ".softground_shift"
+BENT = "softground_bent"
+"""For materials, of curves, instances and points: from 0 to 1, how far they lie."""
+_ROOT, _TOUCHED, _MOVED = ".softground_root", ".softground_touched", ".softground_moved"
+"""Of curves, instances and points meanwhile. The last is a vector in the table's space: where it leans [rad], and how
+far its root goes up."""
 
 INPUTS: Mapping[str, tuple[str, Any, tuple[float, float] | None, str]] = {
     "Table": ("NodeSocketObject", None, None, "Where and when soles tread: an object that each bake writes"),
     "Height": ("NodeSocketFloat", 0.3, (0.001, 10.0), "Height of the tallest plants, from which on soles bend them"),
     "Stiffness": ("NodeSocketFloat", 0.15, (0.0, 1.0), "Share of the bend that springs back as the sole leaves"),
-    "Recovery": ("NodeSocketFloat", 240.0, (0.1, 86400.0), "Time in which plants rise to 1/e of their bend, in seconds"),
+    "Recovery": ("NodeSocketFloat", 240.0, (0.1, 86400.0), "Seconds in which plants rise to 1/e of their bend"),
     "Breaks": ("NodeSocketFloat", 0.3, (0.0, 10.0), "How much stays bent for good: 1 is all of it from 150 kPa on"),
     "Half After": ("NodeSocketFloat", 150.0, (1.0, 10_000.0), "Passes after which half of the plants are worn down"),
-    "Stands": ("NodeSocketBool", True, None, "Plants that bend; off for litter and pebbles, which tilt with the ground"),
+    "Stands": ("NodeSocketBool", True, None, "Plants that bend; off for what lies on the ground and tilts with it"),
     "Sinks": ("NodeSocketBool", True, None, "Press roots into the prints; off where the scatter follows the ground"),
     "Loose Parts": ("NodeSocketBool", False, None, "Bend each separate part of a mesh about its lowest vertices"),
 }
@@ -98,22 +100,21 @@ def _fill(graph: NodeGraph) -> None:
     slot, begun = _found(graph, table, frame)
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
     graph.next_row()
-    values = _values(graph, table, slot, begun, plant, frame, chosen)
+    touched = begun.above(0.5).socket, _moved(graph, table, slot, begun, plant, frame, chosen)
 
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
     position = graph.node("GeometryNodeInputPosition").outputs["Position"]
     root = _at(graph, position, first, "POINT")
-    geometry = _stored(graph, given, "CURVE", root, begun, values)
-    curve = graph.node("GeometryNodeCurveOfPoint").outputs["Curve Index"]
-    geometry = _curves_moved(graph, table, geometry, position, curve)
+    geometry = _stored(graph, given, "CURVE", root, touched)
+    geometry = _put(graph, table, geometry, position)
     graph.next_row()
-    geometry = _instances_moved(graph, table, _stored(graph, geometry, "INSTANCE", position, begun, values), chosen)
+    geometry = _instances_moved(graph, table, _stored(graph, geometry, "INSTANCE", position, touched), chosen)
     graph.next_row()
-    loose = _loose_parts_moved(graph, table, geometry, position, begun, values)
+    loose = _loose_parts_moved(graph, table, geometry, position, touched)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
-    geometry = graph.forgotten(geometry, _ROOT, _TOUCHED, _BEND, _SHIFT)
+    geometry = graph.forgotten(geometry, _ROOT, _TOUCHED, _MOVED)
     acts = graph.both(
         graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
@@ -175,20 +176,18 @@ def _found(graph: NodeGraph, table: _Table, frame: Number) -> tuple[Any, Number]
     return slot.socket, graph.number(graph.at_index(table.vertices, begun.socket, slot.socket, "INT"))
 
 
-def _pass(graph: NodeGraph, table: _Table, index: Any) -> tuple[Pass, Any, list[Number]]:
+def _pass(graph: NodeGraph, table: _Table, index: Any) -> tuple[Pass, list[Number], list[Number]]:
     """A pass of the table, the direction in which it leans blades, and height and slope that it leaves."""
     times, lean, pace, sink = (
         graph.parts(graph.at_index(table.vertices, graph.attribute(name, "FLOAT_VECTOR"), index))
         for name in (TIMES, LEAN, PACE, SINK)
     )
-    by = Pass(times[0], times[1], pace[0], pace[1], times[2], lean[2], pace[2])
-    return by, graph.combined(lean[0].socket, lean[1].socket, 0.0), sink
+    by = Pass(times[0], times[1], pace[0], pace[1], times[2], lean[1], pace[2], lean[2])
+    return by, [graph.number(graph.math(name, lean[0].socket)) for name in ("COSINE", "SINE")], sink
 
 
-def _values(
-    graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Plant, frame: Number, chosen: Any
-) -> dict[str, Any]:
-    """Of a touched root: bend as a vector in which it leans [rad] and shift of the root, with what materials see."""
+def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Plant, frame: Number, chosen: Any) -> Any:
+    """How a touched root moves, as `_MOVED` has it."""
     first = graph.number(graph.at_index(table.vertices, graph.attribute(FIRST, "INT"), slot, "INT"))
     latest = first + begun - 1.0
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
@@ -198,94 +197,80 @@ def _values(
     is_second = begun.above(1.5)
     angle, weight = bend(by, plant, frame, table.frame_rate, chance)
     before, _ = bend(older, plant, frame, table.frame_rate, chance)
-    leaned = graph.vector(
-        "ADD",
-        graph.scaled(way, angle.socket),
-        graph.scaled(older_way, (before * is_second * (1.0 - weight)).socket),
-    )
-    share = graph.number(graph.vector("LENGTH", leaned, output="Value")).at_most(1.0)
+    before = before * is_second * (1.0 - weight)
+    lean = [(new * angle + old * before) * (pi / 2) for new, old in zip(way, older_way, strict=True)]
 
     pressed = ((frame - by.start) / (by.end - by.start).at_least(1.0)).within_one()
-    height, slope_x, slope_y = (
+    height, *slope = (
         old * is_second + (new - old * is_second) * pressed for new, old in zip(left, older_left, strict=True)
     )
     x, y, _ = graph.parts(graph.vector("FRACTION", _in_cells(graph, table)))
-    height = height + slope_x * (x - 0.5) + slope_y * (y - 0.5)
-    sunk = _turned(graph, graph.combined(0.0, 0.0, height.socket), table.to_scatter)
-    tilted = graph.combined((0.0 - slope_x).socket, (0.0 - slope_y).socket, 0.0)
-    steep = graph.number(graph.vector("LENGTH", tilted, output="Value"))
-    stands = chosen["Stands"]
-    toward = graph.vector(
-        "NORMALIZE", _turned(graph, graph.choose("VECTOR", stands, tilted, leaned), table.to_scatter)
-    )
-    by_slope = graph.math("ARCTANGENT", steep.socket)
-    return {
-        _BEND: graph.scaled(toward, graph.choose("FLOAT", stands, by_slope, (share * (pi / 2)).socket)),
-        _SHIFT: graph.choose("VECTOR", chosen["Sinks"], (0.0, 0.0, 0.0), sunk),
-        BENT: share.socket,
-        WORN: (1.0 - cover(by.passes, plant.half_after)).socket,
-    }
+    height = height + slope[0] * (x - 0.5) + slope[1] * (y - 0.5)
+    steep = graph.vector("LENGTH", graph.combined(slope[0].socket, slope[1].socket, 0.0), output="Value")
+    level = (0.0 - graph.number(graph.math("ARCTANGENT", steep))) / graph.number(steep)
+    sunk = graph.choose("FLOAT", chosen["Sinks"], 0.0, height.socket)
+    tilt = [
+        graph.choose("FLOAT", chosen["Stands"], (part * level).socket, bent.socket)
+        for part, bent in zip(slope, lean, strict=True)
+    ]
+    return graph.combined(*tilt, sunk)
 
 
-def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, begun: Number, values: dict[str, Any]) -> Any:
-    """The geometry with the values of its touched roots, as attributes of a domain."""
+def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any]) -> Any:
+    """The geometry with its roots and how the touched ones move, as attributes of a domain."""
     geometry = graph.store(geometry, _ROOT, root, True, "FLOAT_VECTOR", domain)
-    geometry = graph.store(geometry, _TOUCHED, begun.above(0.5).socket, True, "BOOLEAN", domain)
-    for name, value in values.items():
-        kind = "FLOAT_VECTOR" if name in (_BEND, _SHIFT) else "FLOAT"
-        geometry = graph.store(geometry, name, value, graph.attribute(_TOUCHED, "BOOLEAN"), kind, domain)
-    return geometry
+    geometry = graph.store(geometry, _TOUCHED, touched[0], True, "BOOLEAN", domain)
+    is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
+    geometry = graph.store(geometry, _MOVED, touched[1], is_touched, "FLOAT_VECTOR", domain)
+    x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
+    bent = graph.math("MULTIPLY", graph.vector("LENGTH", graph.combined(x.socket, y.socket), output="Value"), 2.0 / pi)
+    return graph.store(geometry, BENT, bent, is_touched, domain=domain)
 
 
-def _offset(graph: NodeGraph, table: _Table, from_root: Any, lean: Any, shift: Any) -> Any:
-    """How far a point goes whose blade leans: what is upright of its way from the root turns, and keeps its length."""
-    angle = graph.number(graph.vector("LENGTH", lean, output="Value"))
+def _lean_and_shift(graph: NodeGraph, table: _Table) -> tuple[Any, Number, Any]:
+    """Direction in which a root leans, its angle [rad] and the way that it goes, in the scatter's space."""
+    x, y, z = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
+    level = graph.combined(x.socket, y.socket, 0.0)
+    toward = graph.vector("NORMALIZE", _turned(graph, level, table.to_scatter))
+    angle = graph.number(graph.vector("LENGTH", level, output="Value"))
+    return toward, angle, _turned(graph, graph.combined(0.0, 0.0, z.socket), table.to_scatter)
+
+
+def _put(graph: NodeGraph, table: _Table, geometry: Any, position: Any) -> Any:
+    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length."""
+    toward, angle, shift = _lean_and_shift(graph, table)
+    from_root = graph.vector("SUBTRACT", position, graph.attribute(_ROOT, "FLOAT_VECTOR"))
     height = graph.number(graph.dot(from_root, table.up)).at_least(0.0)
     sine, cosine = (graph.number(graph.math(name, angle.socket)) for name in ("SINE", "COSINE"))
-    aside = graph.scaled(graph.vector("NORMALIZE", lean), (height * sine).socket)
+    aside = graph.scaled(toward, (height * sine).socket)
     down = graph.scaled(table.up, (height * (cosine - 1.0)).socket)
-    return graph.vector("ADD", graph.vector("ADD", aside, down), shift)
-
-
-def _curves_moved(graph: NodeGraph, table: _Table, geometry: Any, position: Any, curve: Any) -> Any:
-    root, lean, shift = (
-        _at(graph, graph.attribute(name, "FLOAT_VECTOR"), curve, "CURVE") for name in (_ROOT, _BEND, _SHIFT)
-    )
-    touched = _at(graph, graph.attribute(_TOUCHED, "BOOLEAN"), curve, "CURVE", "BOOLEAN")
-    offset = _offset(graph, table, graph.vector("SUBTRACT", position, root), lean, shift)
-    return graph.put(geometry, touched, position, offset)
+    offset = graph.vector("ADD", graph.vector("ADD", aside, down), shift)
+    return graph.put(geometry, graph.attribute(_TOUCHED, "BOOLEAN"), position, offset)
 
 
 def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
-    touched = graph.attribute(_TOUCHED, "BOOLEAN")
-    lean, shift = graph.attribute(_BEND, "FLOAT_VECTOR"), graph.attribute(_SHIFT, "FLOAT_VECTOR")
-    toward = graph.vector("NORMALIZE", lean)
+    toward, angle, shift = _lean_and_shift(graph, table)
     turned = graph.node("FunctionNodeRotateVector")
     graph.link((0.0, 0.0, 1.0), turned.inputs["Vector"])
     graph.link(graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"], turned.inputs["Rotation"])
     stem = graph.choose("VECTOR", chosen["Stands"], table.up, turned.outputs["Vector"])
     to_lie = graph.number(graph.math("ARCCOSINE", graph.dot(stem, toward)))
-    angle = graph.number(graph.vector("LENGTH", lean, output="Value")) * to_lie / (pi / 2)
     rotation = graph.node("FunctionNodeAxisAngleToRotation")
     graph.link(graph.vector("CROSS_PRODUCT", stem, toward), rotation.inputs["Axis"])
-    graph.link(angle.socket, rotation.inputs["Angle"])
-    moved = graph.node("GeometryNodeTranslateInstances")
-    moved.inputs["Local Space"].default_value = False
-    rotated = graph.node("GeometryNodeRotateInstances")
-    rotated.inputs["Local Space"].default_value = False
+    graph.link((angle * to_lie / (pi / 2)).socket, rotation.inputs["Angle"])
+    rotated, moved = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
     for node, name, value in ((rotated, "Rotation", rotation.outputs["Rotation"]), (moved, "Translation", shift)):
+        node.inputs["Local Space"].default_value = False
         graph.link(geometry, node.inputs["Instances"])
-        graph.link(touched, node.inputs["Selection"])
+        graph.link(graph.attribute(_TOUCHED, "BOOLEAN"), node.inputs["Selection"])
         graph.link(value, node.inputs[name])
         geometry = node.outputs["Instances"]
     graph.link(graph.attribute(_ROOT, "FLOAT_VECTOR"), rotated.inputs["Pivot Point"])
     return geometry
 
 
-def _loose_parts_moved(
-    graph: NodeGraph, table: _Table, geometry: Any, position: Any, begun: Number, values: dict[str, Any]
-) -> Any:
+def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position: Any, touched: tuple[Any, Any]) -> Any:
     """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices."""
     parts = graph.node("GeometryNodeSeparateComponents")
     graph.link(geometry, parts.inputs["Geometry"])
@@ -301,12 +286,10 @@ def _loose_parts_moved(
     for _ in range(MEANS):
         mean = graph.number(total((height * low).socket)) / graph.number(total(low.socket))
         low = 1.0 - height.above(mean + 1e-6)
-    count = graph.number(total(low.socket))
-    root = graph.scaled(total(graph.scaled(position, low.socket), "FLOAT_VECTOR"), (1.0 / count).socket)
-    mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, begun, values)
-    root, lean, shift = (graph.attribute(name, "FLOAT_VECTOR") for name in (_ROOT, _BEND, _SHIFT))
-    offset = _offset(graph, table, graph.vector("SUBTRACT", position, root), lean, shift)
-    mesh = graph.put(mesh, graph.attribute(_TOUCHED, "BOOLEAN"), position, offset)
+    share = graph.math("DIVIDE", 1.0, total(low.socket))
+    root = graph.scaled(total(graph.scaled(position, low.socket), "FLOAT_VECTOR"), share)
+    mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, touched)
+    mesh = _put(graph, table, mesh, position)
     joined = graph.node("GeometryNodeJoinGeometry")
     for part in [mesh, *(one for one in parts.outputs if one.name != "Mesh")]:
         graph.link(part, joined.inputs["Geometry"])

@@ -83,6 +83,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     """Store the table in the attributes of vertices, each from the first on; lengths in cells."""
     stretch, scale, by = units.time_stretch, units.unit_scale_m, trampled.by
     rows, columns = trampled.tiles.shape
+    x, y = trampled.direction.T
     size = trampled.cell_size
     start, end = by.start * stretch, by.end * stretch
     pace = 1.0 / (scale * stretch)
@@ -97,7 +98,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
         (nodes.FIRST, "INT", trampled.first),
         (nodes.ACTIVE, "FLOAT", trampled.active * stretch),
         (nodes.TIMES, "FLOAT_VECTOR", np.column_stack([start, end, by.reach])),
-        (nodes.LEAN, "FLOAT_VECTOR", np.column_stack([trampled.direction, by.lasting])),
+        (nodes.LEAN, "FLOAT_VECTOR", np.column_stack([np.arctan2(y, x), by.lasting, by.above / scale])),
         (nodes.PACE, "FLOAT_VECTOR", np.column_stack([by.down * pace, by.up * pace, by.passes])),
         (nodes.SINK, "FLOAT_VECTOR", sink),
     )

@@ -19,6 +19,8 @@ BREAKING_PRESSURE = 150e3
 """Pressure from which on a stem stays bent for good [Pa]."""
 MOST_LASTING = 0.95
 """Share of lying flat that stays for good, at most: broken stems spring up a little."""
+BRUSHED = 0.2
+"""Share of the bend that is left by a sole which passes above the ground."""
 _TOUCHING = 1e-6
 """Clearance below which a sole lies on the root [m]."""
 
@@ -74,7 +76,9 @@ class Pass:
     lasting : float
         What lasts of this and all earlier passes, as `lasting_of` adds up.
     passes : float
-        Number of this pass of a sole over the place.
+        Number of soles that have trodden on the place.
+    above : float
+        Height at which a sole passes the place; 0 of one that treads on it [m].
     """
 
     start: Any
@@ -84,6 +88,7 @@ class Pass:
     reach: Any
     lasting: Any
     passes: Any
+    above: Any
 
 
 def lasting_of(pressure: Any) -> Any:
@@ -146,12 +151,13 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
         From 0 to 1, another for each blade: which of them are worn down first.
     """
     until, since = by.start - frame, frame - by.end
-    clearance = np.maximum(np.maximum(until * by.down, since * by.up), 0.0)
+    clearance = by.above + np.maximum(np.maximum(until * by.down, since * by.up), 0.0)
     holds = held(clearance, plant.height)
     broken = 1.0 - np.exp((0.0 - plant.breaks) * by.lasting)
     stays = np.maximum(broken, np.greater(chance, cover(by.passes, plant.half_after))) * MOST_LASTING
     released = np.maximum(1.0 - plant.stiffness, stays)
     left = np.exp((0.0 - np.maximum(since, 0.0)) / (plant.recovery * frame_rate))
-    rising = (stays + (released - stays) * left) * np.greater(since, 0.0)
-    weight = np.maximum(holds, np.greater(frame, by.start))
-    return np.maximum(holds, rising) * by.reach, weight * by.reach
+    kept = 1.0 - np.greater(by.above, 0.0) * (1.0 - BRUSHED)
+    rising = (stays + (released - stays) * left) * np.greater(since, 0.0) * kept
+    weight = np.maximum(holds, np.greater(frame, by.start) * kept)
+    return np.maximum(holds, rising) * by.reach, weight

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ TALLEST = 1.5
 """Height above which soles bend nothing [m]."""
 HEADS_ON = 0.01
 """Travel along its heading that a sole has beside what it moves while it touches down [m]."""
+FRAMES_PER_SECOND = 24.0
+"""Of footprints that were edited, which do not know."""
+LIFTED = 0.015
+"""Height above its lowest from which on a piece of a sole has left a place [m]."""
 LOOKS_BACK = 2
 """Steps of a contact over which the sole's movement is taken."""
 LEAST_CHANGE = 2e-4
@@ -34,7 +38,13 @@ LEAST_CHANGE = 2e-4
 TILE, MOST_TILES = 16, 1_000_000
 """Cells along the side of a tile, and tiles of the whole map, beyond which they are larger."""
 
-_COLUMNS = ("start", "end", "down", "up", "reach", "lasting", "passes", "x", "y", "sink", "slope_x", "slope_y")
+SWING = 0.04
+"""Height at which a foot passes the ground on its way to the next step [m]."""
+FASTEST, LONGEST = 4.0, 3.0
+"""Speed and length of a swing, beyond which a foot is far above the ground [m/s, m]."""
+
+_OF_PASS = tuple(field.name for field in fields(Pass))
+_COLUMNS = (*_OF_PASS, "x", "y", "sink", "slope_x", "slope_y")
 
 
 @dataclass(frozen=True)
@@ -97,7 +107,7 @@ def tramplings(footprints: Iterable[Footprint]) -> Tramplings | None:
     if not steps:
         return None
     side = max(CELL, *(step.cell_size for step in steps))
-    parts = [_passes(step, side) for step in steps]
+    parts = [*(_passes(step, side) for step in steps), *_swings(steps, side)]
     cells = np.concatenate([part[0] for part in parts])
     table = {name: np.concatenate([part[1][name] for part in parts]) for name in _COLUMNS}
     origin, tile, tiles, slot = _tiled(cells)
@@ -105,7 +115,7 @@ def tramplings(footprints: Iterable[Footprint]) -> Tramplings | None:
     slot, table = slot[order], {name: values[order] for name, values in table.items()}
     kept, table = _in_turn(slot, table)
     slot = slot[kept]
-    first = np.concatenate([[0], np.cumsum(np.bincount(slot, minlength=(len(np.unique(tiles))) * tile**2))])
+    first = np.concatenate([[0], np.cumsum(np.bincount(slot, minlength=int(tiles.max()) + tile**2))])
     is_next = np.concatenate([[False], slot[1:] == slot[:-1]])
     active = table["start"] - TALLEST / table["down"]
     active[is_next] = np.maximum(active[is_next], table["start"][:-1][is_next[1:]])
@@ -116,7 +126,7 @@ def tramplings(footprints: Iterable[Footprint]) -> Tramplings | None:
         tiles,
         first,
         active,
-        Pass(*(table[name] for name in _COLUMNS[:7])),
+        Pass(*(table[name] for name in _OF_PASS)),
         np.column_stack([table["x"], table["y"]]),
         table["sink"],
         np.column_stack([table["slope_x"], table["slope_y"]]),
@@ -135,9 +145,9 @@ def _tiled(cells: Indices) -> tuple[Indices, int, Indices, Indices]:
     columns, rows = np.ptp(cells // tile, axis=0) + 3
     cells = cells - corner * tile
     of_tile = cells[:, 1] // tile * columns + cells[:, 0] // tile
-    known, number = np.unique(of_tile, return_inverse=True)
+    known = np.unique(of_tile)
     tiles = np.zeros(rows * columns, np.int64)
-    tiles[known] = (1 + np.arange(len(known))) * tile**2
+    tiles[known] = np.arange(1, len(known) + 1) * tile**2
     slot = tiles[of_tile] + cells[:, 1] % tile * tile + cells[:, 0] % tile
     return corner * tile, tile, tiles.reshape(rows, columns), slot
 
@@ -190,20 +200,21 @@ def _passes(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
     acted = (gap < BESIDE) | (np.abs(sink[others]) > LEAST_CHANGE)
     others, nearest, gap = others[acted], nearest[acted], gap[acted]
 
-    along, down, up = _movement(step, centre[under], start[under], end[under])
+    movement = _movement(step, centre[under], start[under], end[under])
     outward = centre[others] - centre[under][nearest]
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     source, cell = np.concatenate([np.arange(len(under)), nearest]), np.concatenate([under, others])
     is_under = np.arange(len(cell)) < len(under)
-    direction = np.concatenate([along, outward])
+    direction = np.concatenate([movement.along, outward])
     table = {
         "start": start[under][source],
-        "end": end[under][source],
-        "down": down[source],
-        "up": up[source],
+        "end": movement.end[source],
+        "down": movement.down[source],
+        "up": movement.up[source],
         "reach": np.concatenate([np.ones(len(under)), ASIDE * np.clip(1.0 - gap / BESIDE, 0.0, 1.0)]),
         "lasting": is_under * lasting_of(step.peak_force_n / max(step.area_m2, side**2)),
         "passes": is_under.astype(float),
+        "above": np.zeros(len(cell)),
         "x": direction[:, 0],
         "y": direction[:, 1],
         "sink": sink[cell],
@@ -214,44 +225,94 @@ def _passes(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
     return np.stack([column + window.column, row + window.row], axis=1).astype(np.int64), table
 
 
-def _movement(step: Footprint, place: Array, start: Array, end: Array) -> tuple[Array, Array, Array]:
-    """Where the sole travels as it presses on places (N, 2), unit vectors (N, 2), and how fast it comes down and leaves.
+def _swings(steps: Sequence[Footprint], side: float) -> Iterator[tuple[Indices, dict[str, Array]]]:
+    """What soles brush on their way from each print to their next one, as `_passes` has it."""
+    latest: dict[tuple[str, str], Footprint] = {}
+    for step in steps:
+        before = latest.get((step.character, step.sole))
+        latest[step.character, step.sole] = step
+        if before is None or step.start_frame <= before.end_frame:
+            continue
+        way = step.position[:2] - before.position[:2]
+        length, frames = float(np.hypot(*way)), step.start_frame - before.end_frame
+        second = _frames_per_second(step)
+        if not side < length < min(LONGEST, FASTEST * frames / second):
+            continue
+        ahead = way / length
+        half_length, half_width = _half_sizes(before, ahead)
+        ends = np.array((before.position[:2], step.position[:2]))
+        window = Window.around(ends.min(axis=0) - half_width, ends.max(axis=0) + half_width, side)
+        place = np.stack([values.ravel() for values in np.meshgrid(*window.centres(side))], axis=1)
+        along, across = (place - ends[0]) @ ahead, (place - ends[0]) @ (-ahead[1], ahead[0])
+        passed = np.flatnonzero((along > 0.0) & (along < length) & (np.abs(across) < half_width))
+        share = np.linspace(0.0, 1.0, 65)
+        travel = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)  # of minimum jerk
+        when = [
+            before.end_frame + frames * np.interp((along[passed] + part) / length, travel, share)
+            for part in (-half_length, half_length)
+        ]
+        constants = {"down": SLOWEST / second, "up": SLOWEST / second, "reach": 1.0, "above": SWING}
+        table = {name: np.full(len(passed), constants.get(name, 0.0)) for name in _COLUMNS}
+        table |= {"start": when[0], "end": when[1]}
+        table |= {name: np.full(len(passed), part) for name, part in zip("xy", ahead, strict=True)}
+        row, column = np.divmod(passed, window.columns)
+        yield np.stack([column + window.column, row + window.row], axis=1).astype(np.int64), table
 
-    Speeds are in metres per frame.
+
+def _half_sizes(step: Footprint, ahead: Array) -> tuple[float, float]:
+    """Half of a print's length and width along and across a direction [m]."""
+    x, y = (values.ravel()[step.contact_cells] for values in np.meshgrid(*step.window.centres(step.cell_size)))
+    return 0.5 * float(np.ptp(x * ahead[0] + y * ahead[1])), 0.5 * float(np.ptp(y * ahead[0] - x * ahead[1]))
+
+
+def _frames_per_second(step: Footprint) -> float:
+    by = step.pressed_by
+    return step.load_spacing / by.time_step if by else FRAMES_PER_SECOND
+
+
+@dataclass(frozen=True)
+class _Movement:
+    """How a sole moves over places: its travel, unit vectors (N, 2), speeds [m per frame], and the frames it stays to."""
+
+    along: Array
+    down: Array
+    up: Array
+    end: Array
+
+
+def _movement(step: Footprint, place: Array, start: Array, end: Array) -> _Movement:
+    """Movement of the sole over places (N, 2) that it touches from one frame to another, (N,) each.
+
+    It stays until it has left the place by `LIFTED`: the arch of a foot hardly touches, and lies over plants too.
     """
     heading = np.array((np.cos(step.heading), np.sin(step.heading)))
-    if step.pressed_by is None:  # edited by an artist: it is put down, and lifted again, in a second per metre
-        slow = SLOWEST / _FRAMES_PER_SECOND
-        return np.tile(heading, (len(place), 1)), np.full(len(place), slow), np.full(len(place), slow)
-    steps = step.pressed_by.steps(np.asarray(step.load_frames))
+    if step.pressed_by is None:  # of a print that was edited
+        slow = np.full(len(place), SLOWEST / FRAMES_PER_SECOND)
+        return _Movement(np.tile(heading, (len(place), 1)), slow, slow, end)
+    frames = np.asarray(step.load_frames)
+    steps = step.pressed_by.steps(frames)
     poses, before = np.concatenate([steps.approach, steps.poses]), len(steps.approach)
-    slow = SLOWEST * step.pressed_by.time_step
+    slowest, last, each = SLOWEST * step.pressed_by.time_step, len(poses) - 1, np.arange(len(place))
+    came = before + np.clip(np.searchsorted(frames, start), 0, last - before)
     point = np.column_stack([place, np.full(len(place), step.position[2])])
-    last = len(poses) - 1
-    came = before + np.clip(np.searchsorted(step.load_frames, start), 0, last - before)
-    left = before + np.clip(np.searchsorted(step.load_frames, end), 0, last - before)
     patch = _patch_over(step, poses, came, point)
-
-    def moved(at: Indices, to: Indices) -> Array:
-        """Way of the piece of the sole that is on each place at one step, to another step."""
-        here, there = poses[at, patch], poses[to, patch]
-        local = np.einsum("nji,nj->ni", here[:, :3, :3], point - here[:, :3, 3])
-        way: Array = np.einsum("nij,nj->ni", there[:, :3, :3], local) + there[:, :3, 3] - point
-        return way
+    there = poses[came, patch]
+    local = np.einsum("nji,nj->ni", there[:, :3, :3], point - there[:, :3, 3])
+    placed = poses[:, patch]
+    path = np.einsum("tnij,nj->tni", placed[..., :3, :3], local) + placed[..., :3, 3]  # of what touches there
 
     earlier = np.maximum(came - LOOKS_BACK, 0)
-    way = -moved(came, earlier)
+    way = point - path[earlier, each]
     along = way[:, :2] + HEADS_ON * heading
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    down = np.maximum(-way[:, 2] / np.maximum(came - earlier, 1), slow)
-    later = np.minimum(left + LOOKS_BACK, last)
-    rise = np.where(later > left, moved(left, later)[:, 2], -moved(left, np.maximum(left - 1, 0))[:, 2])
-    up = np.maximum(rise / np.maximum(later - left, 1), slow)
-    return along, down / step.load_spacing, up / step.load_spacing
-
-
-_FRAMES_PER_SECOND = 24.0
-"""Where a step does not know."""
+    down = np.maximum(-way[:, 2] / np.maximum(came - earlier, 1), slowest)
+    height = path[:, :, 2]
+    is_low = height <= height[before:].min(axis=0) + LIFTED
+    left = last - is_low[::-1].argmax(axis=0)
+    later, at = np.minimum(left + LOOKS_BACK, last), np.minimum(left, np.maximum(last - 1, 0))
+    rise = (height[later, each] - height[at, each]) / np.maximum(later - at, 1)
+    stays = np.maximum(end, frames[np.maximum(left - before, 0)])
+    return _Movement(along, down / step.load_spacing, np.maximum(rise, slowest) / step.load_spacing, stays)
 
 
 def _patch_over(step: Footprint, poses: Array, at: Indices, point: Array) -> Indices:
