@@ -30,7 +30,7 @@ META = "softground_meta"
 
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
-_ROOT, _TOUCHED, _MOVED = ".softground_root", ".softground_touched", ".softground_moved"
+_ROOT, _TOUCHED, _CHANCE, _MOVED = (f".softground_{name}" for name in ("root", "touched", "chance", "moved"))
 """Of curves, instances and points meanwhile. The last is a vector in the table's space: where it leans [rad], and how
 far its root goes up."""
 
@@ -114,7 +114,7 @@ def _fill(graph: NodeGraph) -> None:
     graph.next_row()
     loose = _loose_parts_moved(graph, table, geometry, position, touched)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
-    geometry = graph.forgotten(geometry, _ROOT, _TOUCHED, _MOVED)
+    geometry = graph.forgotten(geometry, _ROOT, _TOUCHED, _CHANCE, _MOVED)
     acts = graph.both(
         graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
@@ -190,8 +190,7 @@ def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Pla
     """How a touched root moves, as `_MOVED` has it."""
     first = graph.number(graph.at_index(table.vertices, graph.attribute(FIRST, "INT"), slot, "INT"))
     latest = first + begun - 1.0
-    random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
-    chance = graph.number(next(one for one in random.outputs if one.enabled))
+    chance = graph.number(graph.attribute(_CHANCE))
     by, way, left = _pass(graph, table, latest.socket)
     older, older_way, older_left = _pass(graph, table, (latest - 1.0).socket)
     is_second = begun.above(1.5)
@@ -216,11 +215,18 @@ def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Pla
     return graph.combined(*tilt, sunk)
 
 
-def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any]) -> Any:
-    """The geometry with its roots and how the touched ones move, as attributes of a domain."""
+def _stored(
+    graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any], each: Any = None
+) -> Any:
+    """The geometry with its roots and how the touched ones move, as attributes of a domain; `each` numbers plants."""
     geometry = graph.store(geometry, _ROOT, root, True, "FLOAT_VECTOR", domain)
     geometry = graph.store(geometry, _TOUCHED, touched[0], True, "BOOLEAN", domain)
     is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
+    random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
+    if each is not None:
+        graph.link(each, next(one for one in random.inputs if one.name == "ID"))
+    chance = next(one for one in random.outputs if one.enabled)
+    geometry = graph.store(geometry, _CHANCE, chance, is_touched, domain=domain)
     geometry = graph.store(geometry, _MOVED, touched[1], is_touched, "FLOAT_VECTOR", domain)
     x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
     bent = graph.math("MULTIPLY", graph.vector("LENGTH", graph.combined(x.socket, y.socket), output="Value"), 2.0 / pi)
@@ -288,7 +294,7 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
         low = 1.0 - height.above(mean + 1e-6)
     share = graph.math("DIVIDE", 1.0, total(low.socket))
     root = graph.scaled(total(graph.scaled(position, low.socket), "FLOAT_VECTOR"), share)
-    mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, touched)
+    mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, touched, island)
     mesh = _put(graph, table, mesh, position)
     joined = graph.node("GeometryNodeJoinGeometry")
     for part in [mesh, *(one for one in parts.outputs if one.name != "Mesh")]:

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CELL = 0.025
-"""Side of a cell, unless the bake's are larger [m]."""
+"""Side of a cell, about: a whole number of those of the bake [m]."""
 BESIDE = 0.05
 """How far beside a sole blades are pushed aside by the shoe [m]."""
 ASIDE = 40.0 / 90.0
@@ -40,6 +40,8 @@ TILE, MOST_TILES = 16, 1_000_000
 
 SWING = 0.04
 """Height at which a foot passes the ground on its way to the next step [m]."""
+PASSING = 3.0
+"""Speed at which it comes over a place and leaves it again [m/s]."""
 FASTEST, LONGEST = 4.0, 3.0
 """Speed and length of a swing, beyond which a foot is far above the ground [m/s, m]."""
 
@@ -106,7 +108,8 @@ def tramplings(footprints: Iterable[Footprint]) -> Tramplings | None:
     steps = sorted((step for step in footprints if len(step.contact_cells)), key=lambda step: step.start_frame)
     if not steps:
         return None
-    side = max(CELL, *(step.cell_size for step in steps))
+    fine = steps[0].cell_size
+    side = fine * max(1, round(CELL / fine))
     parts = [*(_passes(step, side) for step in steps), *_swings(steps, side)]
     cells = np.concatenate([part[0] for part in parts])
     table = {name: np.concatenate([part[1][name] for part in parts]) for name in _COLUMNS}
@@ -251,7 +254,7 @@ def _swings(steps: Sequence[Footprint], side: float) -> Iterator[tuple[Indices, 
             before.end_frame + frames * np.interp((along[passed] + part) / length, travel, share)
             for part in (-half_length, half_length)
         ]
-        constants = {"down": SLOWEST / second, "up": SLOWEST / second, "reach": 1.0, "above": SWING}
+        constants = {"down": PASSING / second, "up": PASSING / second, "reach": 1.0, "above": SWING}
         table = {name: np.full(len(passed), constants.get(name, 0.0)) for name in _COLUMNS}
         table |= {"start": when[0], "end": when[1]}
         table |= {name: np.full(len(passed), part) for name, part in zip("xy", ahead, strict=True)}
@@ -272,7 +275,7 @@ def _frames_per_second(step: Footprint) -> float:
 
 @dataclass(frozen=True)
 class _Movement:
-    """How a sole moves over places: its travel, unit vectors (N, 2), speeds [m per frame], and the frames it stays to."""
+    """A sole over places: its travel, unit vectors (N, 2), speeds [m per frame] and the frames it stays to."""
 
     along: Array
     down: Array
