@@ -26,6 +26,7 @@ def walked(scene):
     shots.walker(scene, frames=48)
     bpy.ops.softground.add_character()
     assert bpy.ops.softground.bake() == {"FINISHED"}
+    give_way_nodes.ensure_group().use_fake_user = True  # which takes seconds to build
 
 
 @pytest.fixture
@@ -245,6 +246,7 @@ def test_plants_of_a_muted_step_stand_again_and_clear_lets_all_stand_until_the_n
     assert state(grass) == before
     assert own_data.PASSES not in baked_ground.display_mesh_of(ground).data.attributes
     assert bpy.ops.softground.bake() == {"FINISHED"}
+    give_way_nodes.ensure_group().use_fake_user = True  # which takes seconds to build
     shot.frame_set(48)
     np.testing.assert_allclose(angles(grass), lying, atol=1e-3)
 
@@ -353,3 +355,16 @@ def test_the_ground_itself_does_not_give_way_without_a_scatter(shot):
         obj.select_set(False)
     baked_ground.display_mesh_of(shot.softground.ground).select_set(True)
     assert not bpy.ops.softground.give_way.poll()
+
+
+def test_the_sample_meadow_grows_on_the_ground_and_gives_way(shot):
+    assert bpy.ops.softground.add_sample_meadow() == {"FINISHED"}
+    grass = bpy.data.objects["SoftGround Meadow"]
+    place = blades_of(grass)[::POINTS]
+    np.testing.assert_allclose(place[:, 2], 0.0, atol=1e-5)
+    shot.frame_set(48)
+    lying = angles(grass) > 80.0
+    table = tramplings(baked_ground.load(shot.softground.ground)[0])
+    latest = table.latest(*place[:, :2].T)
+    assert 50 < lying.sum() < 0.2 * len(lying)
+    assert (latest[lying] >= 0).all()
