@@ -100,7 +100,8 @@ def _height_of(obj: bpy.types.Object, instances: Any) -> float:
         return float(np.percentile(instances, _TALL))
     scale = obj.matrix_world.to_scale().z
     if obj.type == "MESH":
-        return 0.0 if not obj.data.vertices else scale * float(np.ptp(mesh_arrays.positions(obj.data)[:, 2]))
+        up = mesh_arrays.positions(cast("bpy.types.Mesh", obj.data))[:, 2]
+        return scale * float(np.ptp(up)) if len(up) else 0.0
     curves: Any = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     if not len(curves.curves):
         return 0.0

@@ -129,9 +129,11 @@ def _table(graph: NodeGraph, obj: Any) -> _Table:
     inverted = graph.node("FunctionNodeInvertMatrix")
     graph.link(to_scatter, inverted.inputs["Matrix"])
     numbers = graph.attribute(META, "FLOAT_VECTOR")
-    meta = [part for index in (0, 1) for part in graph.parts(graph.at_index(vertices, numbers, index))]
+    row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
+    columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
     up = graph.vector("NORMALIZE", _turned(graph, (0.0, 0.0, 1.0), to_scatter))
-    return _Table(vertices, to_scatter, inverted.outputs["Matrix"], *meta, up)
+    space = to_scatter, inverted.outputs["Matrix"]
+    return _Table(vertices, *space, row, tile, frame_rate, columns, rows, first_frame, up)
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
@@ -215,9 +217,7 @@ def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Pla
     return graph.combined(*tilt, sunk)
 
 
-def _stored(
-    graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any], each: Any = None
-) -> Any:
+def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any], each: Any = None) -> Any:
     """The geometry with its roots and how the touched ones move, as attributes of a domain; `each` numbers plants."""
     geometry = graph.store(geometry, _ROOT, root, True, "FLOAT_VECTOR", domain)
     geometry = graph.store(geometry, _TOUCHED, touched[0], True, "BOOLEAN", domain)

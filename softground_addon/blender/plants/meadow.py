@@ -20,6 +20,8 @@ PER_TUFT, TUFT = 12, 0.035
 """Blades that grow together, and how far apart [m]."""
 HEIGHT = 0.28
 """Of the tallest blades [m]."""
+THICKNESS = 0.0025
+"""Of a blade at its root [m]."""
 _POINTS = 5
 DARK, LIGHT = (0.035, 0.075, 0.012), (0.20, 0.24, 0.06)
 """Linear colours of blades."""
@@ -49,15 +51,20 @@ def grow(corners: Array, unit_scale: float, near: Array | None = None, reach: fl
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     tufts = max(1, int(min(MOST, DENSITY * area.sum()) / PER_TUFT))
     on = corners[chance.choice(len(corners), tufts, p=area / area.sum())]
-    root = np.einsum("nk,nki->ni", chance.dirichlet((1.0, 1.0, 1.0), tufts), on).repeat(PER_TUFT, axis=0)
+    return planted(np.einsum("nk,nki->ni", chance.dirichlet((1.0, 1.0, 1.0), tufts), on), chance, unit_scale)
+
+
+def planted(tufts: Array, chance: np.random.Generator, unit_scale: float) -> bpy.types.Object:
+    """Blades that grow in tufts at places (N, 3) [m], as an object in no collection yet."""
+    root = tufts.repeat(PER_TUFT, axis=0)
     root[:, :2] += chance.normal(0.0, TUFT / 2, (len(root), 2))
-    height = HEIGHT * chance.beta(4.0, 2.0, len(root)) * chance.uniform(0.6, 1.0, tufts).repeat(PER_TUFT)
+    height = HEIGHT * chance.beta(4.0, 2.0, len(root)) * chance.uniform(0.6, 1.0, len(tufts)).repeat(PER_TUFT)
     turn, droop = chance.uniform(0.0, 2 * pi, len(root)), height * chance.uniform(0.1, 0.55, len(root))
     along = np.linspace(0.0, 1.0, _POINTS)
     aside = np.stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))], axis=1) * droop[:, None]
     places = root[:, None] + along[:, None] ** 2 * aside[:, None]
     places[:, :, 2] += along * height[:, None]
-    return bpy.data.objects.new(NAME, _curves(places / unit_scale, 0.002 / unit_scale))
+    return bpy.data.objects.new(NAME, _curves(places / unit_scale, THICKNESS / unit_scale))
 
 
 def _curves(places: Array, thickness: float) -> bpy.types.Curves:

@@ -238,7 +238,8 @@ def test_plants_of_a_muted_step_stand_again_and_clear_lets_all_stand_until_the_n
     lying, ground = angles(grass), shot.softground.ground
     bake = step_edits.editable(shot)
     step_edits.edit(shot, bake, {step_id(bake.left.footprints[1]): StepEdit(mute=True)})
-    assert lying[0] > 60.0 > 20.0 > angles(grass)[0]  # the other foot may brush it
+    assert lying[0] > 60.0
+    assert angles(grass)[0] < 20.0  # the foot may brush it on its way to the next step
     step_edits.edit(shot, step_edits.editable(shot), {})
     np.testing.assert_allclose(angles(grass), lying, atol=1e-3)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
