@@ -24,7 +24,7 @@ PRESET = "Soil"
 FRAMES = 190
 START = 1.2  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
-EYE = (0.75, 1.9, 1.25)
+EYE = (0.42, 1.45, 0.92)
 TUFTS, NEAREST, FARTHEST = 42_000, 0.9, 26.0
 """Tufts of grass, of which as many stand in each octave of distance from the camera [m]."""
 HEIGHT = open_air.rolling(swell=0.18, hills=18.0, seed=5)
@@ -39,9 +39,9 @@ class Meadow:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Meadow:
     """A wide ground, and a walk away from the camera."""
-    ground = open_air.add_ground(scene, "Meadow", (-26.0, START + 3.0), HEIGHT, "soil")
+    ground = open_air.add_ground(scene, "Meadow", (-26.0, START + 3.0), HEIGHT, "soil", {"growth": _growth})
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, EYE, (-0.15, -3.2, 0.15), 30.0, (0.0, -1.2, 0.1), 8.0)
+    open_air.add_camera(scene, EYE, (-0.12, -2.2, 0.10), 30.0, (0.0, -0.9, 0.1), 16.0)
     bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, {"relief": "OFF"} | dict(options or {}))
     return Meadow({PRESET: bake})
 
@@ -62,7 +62,7 @@ def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
     production.make_active(grass)
     bpy.ops.softground.give_way(kind="MEADOW")
     for material in baked_ground.display_mesh_of(scene.softground.ground).data.materials:
-        open_air.darken(material, 0.35)
+        open_air.overgrow(material, "growth", meadow.DARK, meadow.LIGHT)
     spots = np.column_stack([chance.normal(0.0, 45.0, 90), -chance.uniform(38.0, 110.0, 90)])
     leaves = (0.030, 0.045, 0.010), (0.12, 0.14, 0.035)
     broadleaf.add_broadleaves(spots, chance.uniform(3.0, 8.0, 90), HEIGHT, *leaves, stem=0.15, seed=40)
@@ -74,6 +74,11 @@ def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
     path = folder / "meadow.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
+
+
+def _growth(x: Array, y: Array) -> Array:
+    """Share of the ground that is green from afar: all of it."""
+    return np.ones(np.broadcast(x, y).shape)
 
 
 def _tufts(chance: np.random.Generator) -> Array:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
-from softground_addon.blender import compat
-from softground_addon.blender.baking import step_edits
+from softground_addon.blender import compat, mesh_arrays
+from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.node_modifiers import inputs_of
 from softground_addon.blender.plants import give_way_nodes, trampling_table
@@ -284,6 +284,7 @@ def test_it_holds_wherever_scatter_and_ground_are_moved_to(shot):
     # The points of one are elsewhere, and its object brings them back.
     flat = np.column_stack([blades_of(other), np.ones(len(place) * POINTS)]) @ np.array(move.inverted()).T
     other.data.attributes["position"].data.foreach_set("vector", flat[:, :3].astype(np.float32).ravel())
+    other.data.update_tag()
     other.matrix_world = move
     bpy.context.view_layer.update()
     moved = blades(other)[1]
@@ -369,3 +370,42 @@ def test_the_sample_meadow_grows_on_the_ground_and_gives_way(shot):
     latest = table.latest(*place[:, :2].T)
     assert 50 < lying.sum() < 0.2 * len(lying)
     assert (latest[lying] >= 0).all()
+
+
+def grown_on(ground):
+    """The blades of the scatter on the vertices of the ground itself, by a modifier of its own."""
+    blade = scattered(np.zeros((1, 3)))
+    tree = blade.modifiers[0].node_group
+    bpy.data.objects.remove(blade)
+    given, out, on, _ = tree.nodes
+    both = tree.nodes.new("GeometryNodeJoinGeometry")
+    tree.links.new(on.outputs[0], both.inputs[0])
+    tree.links.new(given.outputs[0], both.inputs[0])
+    tree.links.new(both.outputs[0], out.inputs[0])
+    ground.modifiers.new("Mine", "NODES").node_group = tree
+
+
+def test_a_scatter_on_the_ground_itself_bends_and_the_ground_stays_as_it_is(shot):
+    ground = shot.softground.ground
+    bpy.ops.softground.clear_bake()
+    grown_on(ground)
+    shot.softground.detail = "NEVER"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    shot.frame_set(40)
+
+    def seen():
+        graph = bpy.context.evaluated_depsgraph_get()
+        surface = mesh_arrays.positions(ground.evaluated_get(graph).data).tobytes()
+        return surface, [i.matrix_world.copy() for i in graph.object_instances if i.is_instance]
+
+    assert not bake_report.stale_reasons(shot)
+    surface, standing = seen()
+    modifier = give_way(ground)
+    bent_surface, bent = seen()
+    assert bent_surface == surface
+    tilt = np.array([np.degrees((m.to_3x3() @ Vector((0, 0, 1))).angle((0, 0, 1))) for m in bent])
+    assert len(bent) == len(standing)
+    assert (tilt > 60.0).sum() > 10
+    assert max((a.translation - b.translation).length for a, b in zip(bent, standing, strict=True)) < 1e-6
+    assert compat.read_input(modifier, inputs_of(modifier)["Loose Parts"]) is False
+    assert not bake_report.stale_reasons(shot)
