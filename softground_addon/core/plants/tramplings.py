@@ -33,8 +33,8 @@ LIFTED = 0.015
 """Height above its lowest from which on a piece of a sole has left a place [m]."""
 LOOKS_BACK = 2
 """Steps of a contact over which the sole's movement is taken."""
-LEAST_CHANGE = 2e-4
-"""Change of height beside prints from which on litter moves with the ground [m]."""
+RIM, LEAST_CHANGE = 0.2, 2e-4
+"""How far beside a sole litter moves with the ground, and from which change of its height on [m]."""
 TILE, MOST_TILES = 16, 1_000_000
 """Cells along the side of a tile, and tiles of the whole map, beyond which they are larger."""
 
@@ -197,16 +197,17 @@ def _passes(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
 
     under = np.flatnonzero(np.isfinite(start))
     centre = np.stack([values.ravel() for values in np.meshgrid(*window.centres(side))], axis=1)
-    others = np.setdiff1d(np.arange(window.cells), under)
-    apart = np.linalg.norm(centre[others, None] - centre[under], axis=2)
-    nearest, gap = apart.argmin(axis=1), apart.min(axis=1) - 0.5 * side
-    acted = (gap < BESIDE) | (np.abs(sink[others]) > LEAST_CHANGE)
-    others, nearest, gap = others[acted], nearest[acted], gap[acted]
+    owner = _nearest(np.isfinite(start).reshape(shape), int(np.ceil(max(BESIDE, RIM) / side))).ravel()
+    gap = np.linalg.norm(centre - centre[owner], axis=1) - 0.5 * side
+    acted = (gap < BESIDE) | (np.abs(sink) > LEAST_CHANGE)
+    others = np.flatnonzero(~np.isfinite(start) & (owner >= 0) & acted)
+    gap = gap[others]
 
     movement = _movement(step, centre[under], start[under], end[under])
-    outward = centre[others] - centre[under][nearest]
+    outward = centre[others] - centre[owner[others]]
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    source, cell = np.concatenate([np.arange(len(under)), nearest]), np.concatenate([under, others])
+    cell = np.concatenate([under, others])
+    source = np.searchsorted(under, owner[cell])
     is_under = np.arange(len(cell)) < len(under)
     direction = np.concatenate([movement.along, outward])
     table = {
@@ -226,6 +227,23 @@ def _passes(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
     }
     row, column = np.divmod(cell, window.columns)
     return np.stack([column + window.column, row + window.row], axis=1).astype(np.int64), table
+
+
+def _nearest(marked: NDArray[np.bool_], rings: int) -> Indices:
+    """Number of the marked cell that is nearest to each, about; -1 of cells that are further than some rings."""
+    rows, columns = marked.shape
+    number = np.arange(marked.size).reshape(rows, columns)
+    row, column = np.mgrid[:rows, :columns]
+    owner = np.where(marked, number, -1)
+    best = np.where(marked, 0, np.iinfo(np.int64).max)
+    for _ in range(rings):
+        padded = np.pad(owner, 1, constant_values=-1)
+        for down, right in ((i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)):
+            other = padded[down : down + rows, right : right + columns]
+            apart = (row - other // columns) ** 2 + (column - other % columns) ** 2
+            nearer = (other >= 0) & (apart < best)
+            owner, best = np.where(nearer, other, owner), np.where(nearer, apart, best)
+    return owner
 
 
 def _swings(steps: Sequence[Footprint], side: float) -> Iterator[tuple[Indices, dict[str, Array]]]:
@@ -299,17 +317,16 @@ def _movement(step: Footprint, place: Array, start: Array, end: Array) -> _Movem
     came = before + np.clip(np.searchsorted(frames, start), 0, last - before)
     point = np.column_stack([place, np.full(len(place), step.position[2])])
     patch = _patch_over(step, poses, came, point)
-    there = poses[came, patch]
-    local = np.einsum("nji,nj->ni", there[:, :3, :3], point - there[:, :3, 3])
-    placed = poses[:, patch]
-    path = np.einsum("tnij,nj->tni", placed[..., :3, :3], local) + placed[..., :3, 3]  # of what touches there
-
-    earlier = np.maximum(came - LOOKS_BACK, 0)
-    way = point - path[earlier, each]
+    there, earlier = poses[came, patch], np.maximum(came - LOOKS_BACK, 0)
+    local = np.ones((len(place), 4))  # of what touches there, in its patch
+    local[:, :3] = np.einsum("nji,nj->ni", there[:, :3, :3], point - there[:, :3, 3])
+    way = point - np.einsum("nij,nj->ni", poses[earlier, patch], local)[:, :3]
     along = way[:, :2] + HEADS_ON * heading
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     down = np.maximum(-way[:, 2] / np.maximum(came - earlier, 1), slowest)
-    height = path[:, :, 2]
+    height = np.empty((len(poses), len(place)))
+    for number in range(poses.shape[1]):
+        height[:, patch == number] = poses[:, number, 2] @ local[patch == number].T
     is_low = height <= height[before:].min(axis=0) + LIFTED
     left = last - is_low[::-1].argmax(axis=0)
     later, at = np.minimum(left + LOOKS_BACK, last), np.minimum(left, np.maximum(last - 1, 0))

@@ -18,6 +18,7 @@ from softground_addon.core.plants.bending import MOST_LASTING, PLANTS
 from softground_addon.core.plants.tramplings import tramplings
 from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
+from tests.blender.grounds import plane
 
 HEIGHT, POINTS, RATE = 0.3, 5, 24.0
 
@@ -409,3 +410,21 @@ def test_a_scatter_on_the_ground_itself_bends_and_the_ground_stays_as_it_is(shot
     assert max((a.translation - b.translation).length for a, b in zip(bent, standing, strict=True)) < 1e-6
     assert compat.read_input(modifier, inputs_of(modifier)["Loose Parts"]) is False
     assert not bake_report.stale_reasons(shot)
+
+
+def test_on_a_terrain_with_a_finer_copy_along_the_trail_a_scatter_from_it_gives_way(shot):
+    bpy.ops.softground.clear_bake()
+    shot.softground.ground = plane(shot, 12.0, 24)
+    shot.softground.detail = "ALWAYS"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    terrain = shot.softground.ground
+    assert baked_ground.display_mesh_of(terrain) != terrain
+    place = roots()
+    scatter = scattered(place)
+    info = scatter.modifiers[0].node_group.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value = terrain  # which is hidden, and stays as it is
+    modifier = give_way(scatter)
+    assert compat.read_input(modifier, inputs_of(modifier)["Sinks"]) is True
+    shot.frame_set(40)
+    assert angles(scatter)[0] > 60.0
+    assert blades(scatter)[0][0, 2] < -0.015
