@@ -23,7 +23,7 @@ CELL_SIZE: float | None = None
 PRESET = "Soil"
 FRAMES = 190
 START = 1.2  # m along y; the walk is toward -y
-PICTURE = (1920, 1080)
+PICTURE = (1280, 720)
 EYE = (0.42, 1.45, 0.92)
 TUFTS, NEAREST, FARTHEST = 42_000, 0.9, 26.0
 """Tufts of grass, of which as many stand in each octave of distance from the camera [m]."""
@@ -54,7 +54,7 @@ def claims(built: Meadow) -> list[Claim]:
 def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
     """From the height of a child, against the evening sun."""
     scene = bpy.context.scene
-    open_air.add_low_sun(scene, radians(62), radians(11), (1.0, 0.70, 0.42), 9.0, 0.22, open_air.PALE_DUSK)
+    open_air.add_low_sun(scene, radians(62), radians(13), (1.0, 0.74, 0.48), 10.0, 0.26, open_air.PALE_DUSK)
     chance = np.random.default_rng(3)
     grass = meadow.planted(_tufts(chance), chance, 1.0)
     scene.collection.objects.link(grass)
@@ -70,7 +70,7 @@ def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
     outfit.wear_creased(hiker, Body())
     outfit.wear_rucksack(hiker, Body())
     scene.frame_set(scene.frame_end)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.9, 82
+    scene.view_settings.exposure, scene.render.image_settings.quality = 1.2, 85
     path = folder / "meadow.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]

@@ -12,9 +12,10 @@ from bpy.props import EnumProperty
 from ...core.errors import InputError
 from ...core.settings import SceneUnits
 from .. import mesh_arrays, settings
-from ..ground import baked_ground, ground_mesh, ground_surface, trampled_ground
+from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..operator_base import reports_errors
 from ..plants import give_way, meadow, trampling_table
+from ..weather.ground_weather import damage_named
 
 
 class SOFTGROUND_OT_give_way(bpy.types.Operator):
@@ -38,7 +39,7 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         ground = settings.options_of(context).ground
         chosen = _chosen(context, ground)
-        linked = next((obj for obj in chosen if obj.library or obj.override_library), None)
+        linked = next((obj for obj in chosen if obj.library), None)
         if linked is not None:
             raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
         _let(ground, chosen, self.kind)
@@ -48,12 +49,14 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
 
 def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str) -> None:
     """Let objects give way to the prints of a ground."""
-    is_new = trampling_table.of(ground) is None
-    table = trampling_table.ensure(ground)
-    if is_new and baked_ground.is_baked(ground):
+    ground_checks.check_writable(ground)
+    if trampling_table.of(ground) is None and baked_ground.is_baked(ground):
         footprints, about = baked_ground.load(ground)
-        units = baked_ground.units_of(about["inputs"])
+        with damage_named(ground):
+            units = baked_ground.units_of(about["inputs"])
+        trampling_table.ensure(ground)
         trampled_ground.write(ground, footprints, SceneUnits(**{name: units[name] for name in _UNITS}))
+    table = trampling_table.ensure(ground)
     for obj in chosen:
         give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
 

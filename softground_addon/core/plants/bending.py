@@ -19,7 +19,7 @@ BREAKING_PRESSURE = 150e3
 """Pressure from which on a stem stays bent for good [Pa]."""
 MOST_LASTING = 0.95
 """Share of lying flat that stays for good, at most: broken stems spring up a little."""
-BRUSHED = 0.2
+BRUSHED = 0.35
 """Share of the bend that is left by a sole which passes above the ground."""
 _TOUCHING = 1e-6
 """Clearance below which a sole lies on the root [m]."""
