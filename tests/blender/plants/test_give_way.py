@@ -432,7 +432,7 @@ def test_on_a_terrain_with_a_finer_copy_along_the_trail_a_scatter_from_it_gives_
 
 
 SKIN, DEEP, SHOE = 0.004, (0.012, 0.023, 1.0), 0.05
-"""Depth from which on a blade counts as inside [m], a direction that meets no edge, and half of a shoe's thickness [m]."""
+"""Depth from which on a blade is inside [m], a direction that meets no edge, and half of a shoe's thickness [m]."""
 
 
 def inside_shoes(figure, points):
@@ -453,7 +453,7 @@ def inside_shoes(figure, points):
 
 
 def test_hardly_a_blade_is_inside_a_shoe_that_stands(shot):
-    """While both feet bear, counted on the skin; a foot in the air is only met by about half as many."""
+    """While both feet bear, counted on the skin; a foot in the air meets a few more."""
     grass = hair(roots(3000))
     modifier = give_way(grass)
     figure = next(obj for obj in shot.objects if obj.type == "MESH" and obj.parent and obj.parent.type == "ARMATURE")
