@@ -82,11 +82,7 @@ def tier(name, kind):
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [
-        pytest.param(name, kind, marks=tier(name, kind))
-        for name in [*shots.MOTION_FILES, "walker"]
-        for kind in GROUNDS
-    ],
+    [pytest.param(name, kind, marks=tier(name, kind)) for name in [*shots.MOTION_FILES, "walker"] for kind in GROUNDS],
 )
 def test_standing_soles_lie_on_the_ground_legs_reach_and_knees_do_not_flip(scene, name, kind):
     shape, material = GROUNDS[kind]
