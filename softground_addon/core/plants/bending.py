@@ -2,8 +2,9 @@
 
 References
 ----------
-.. [1] D. N. Cole, N. G. Bayfield, "Recreational trampling of vegetation: standard experimental procedures", Biological
-   Conservation 63 (1993), doi:10.1016/0006-3207(93)90714-C: cover against the number of passes.
+.. [1] D. N. Cole, "Experimental trampling of vegetation. I. Relationship between trampling intensity and vegetation
+   response", Journal of Applied Ecology 32 (1995), 203-214: cover after 0 to 500 passes falls fast at first, as a
+   parabola in most of 18 types of vegetation. An exponential falls likewise, and never rises again.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Plant:
     breaks : float
         Multiplies what lasts; 0 is a plant that always rises.
     half_after : float
-        Passes after which half of the plants are worn down, 75 to 300 of grass [1]_.
+        Passes after which half of the plants are worn down, 75 to 300 in the presets.
     """
 
     height: Any
@@ -105,7 +106,7 @@ def lasting_of(pressure: Any) -> Any:
 
 
 def cover(passes: Any, half_after: Any) -> Any:
-    """Share of plants that are left after passes of a sole [1]_.
+    """Share of plants that are left after passes of a sole, an exponential in place of a parabola [1]_.
 
     Examples
     --------

@@ -52,7 +52,7 @@ def test_of_what_two_passes_leave_bent_the_shares_multiply():
     np.testing.assert_allclose(np.exp(-2 * lasting_of(75e3)), 0.25)
 
 
-def test_half_of_the_plants_lie_for_good_after_as_many_passes_as_the_trials_say():
+def test_half_of_the_plants_lie_for_good_after_the_passes_of_their_preset():
     chance, late = (np.arange(1000) + 0.5) / 1000, TREAD.end + 1e6
     for passes, left in ((150, 0.5), (300, 0.25)):
         assert cover(passes, 150.0) == pytest.approx(left)
