@@ -24,7 +24,7 @@ def memory(what: str) -> int:
 
 
 def main(scale: float, cell_size: float, frames: int) -> dict[str, tuple[float, float]]:
-    """Time [s] and memory [bytes] of a bake with default settings: as estimated at this machine's pace, and as taken."""
+    """Time [s] and memory [bytes] of a default bake: as estimated at the pace of this machine, and as taken."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     walker = shots.walker(scene, frames=frames, coarseness=1.0)
