@@ -30,15 +30,17 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """True if the scene has a ground, and something is selected that may give way."""
+        """True if the scene has a ground and the active object may give way: a redraw looks at no other."""
         cls.poll_message_set("Choose a ground, and select plants or litter on it")
-        ground = settings.options_of(context).ground
-        return ground is not None and context.mode == "OBJECT" and bool(_chosen(context, ground))
+        ground, active = settings.options_of(context).ground, context.active_object
+        if ground is None or active is None or not active.select_get() or context.mode != "OBJECT":
+            return False
+        return _may_give_way(active, ground)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         ground = settings.options_of(context).ground
-        chosen = _chosen(context, ground)
+        chosen = [obj for obj in context.selected_objects if _may_give_way(obj, ground)]
         linked = next((obj for obj in chosen if obj.library), None)
         if linked is not None:
             raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
@@ -64,15 +66,12 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
 _UNITS = [field.name for field in fields(SceneUnits)]
 
 
-def _chosen(context: bpy.types.Context, ground: bpy.types.Object) -> list[bpy.types.Object]:
-    """Selected objects that may give way; a ground only with a scatter of its own."""
-    shown = {ground, baked_ground.display_mesh_of(ground)}
-    return [
-        obj
-        for obj in context.selected_objects
-        if obj.type in give_way.SCATTERS
-        and (obj not in shown or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj)))
-    ]
+def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
+    """True of plants and litter; of a ground only with a scatter of its own."""
+    if obj.type not in give_way.SCATTERS:
+        return False
+    is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
+    return not is_ground or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj))
 
 
 class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):

@@ -103,6 +103,7 @@ def give_way(*objects, kind="MEADOW"):
         obj.select_set(False)
     for obj in objects:
         obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
     assert bpy.ops.softground.give_way(kind=kind) == {"FINISHED"}
     return objects[0].modifiers[-1]
 
@@ -357,7 +358,8 @@ def test_pressed_again_it_takes_the_values_of_another_preset(shot):
 def test_the_ground_itself_does_not_give_way_without_a_scatter(shot):
     for obj in bpy.context.selected_objects:
         obj.select_set(False)
-    baked_ground.display_mesh_of(shot.softground.ground).select_set(True)
+    shown = bpy.context.view_layer.objects.active = baked_ground.display_mesh_of(shot.softground.ground)
+    shown.select_set(True)
     assert not bpy.ops.softground.give_way.poll()
 
 
