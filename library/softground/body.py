@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +14,7 @@ from ._core.capture.skeleton import Skeleton, skeleton_of
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
 from ._core.motion.people import likely_mass
+from ._core.numerics.slices import result_of
 from ._core.rig.bare_body import bare_body, body_motion, recorded, with_toes
 from ._core.rig.bones import RestBone
 from ._core.rig.mapping import BoneEnd, RigMapping, SoleSource
@@ -26,7 +26,6 @@ from ._core.rig.skin_mass import skin_mass
 from .markers import motion_of_markers
 
 Array = NDArray[np.float64]
-Result = TypeVar("Result")
 
 GRAVITY = 9.81
 """[m/s²]"""
@@ -171,7 +170,7 @@ class Body:
             {},
             SceneUnits(skeleton.rate, 1.0, GRAVITY, 1.0),
         )
-        motion = _result(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
+        motion = result_of(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
         return _weighed(motion, mass, 0.0, plates)
 
     @classmethod
@@ -220,7 +219,7 @@ class Body:
             raise InputError("no part of the mesh rests on the ground: it needs Z up, metres, and some contact")
         volume = skin_mass(body.skin, body.bones, recording.of(np.array([0])))
         work = body_motion(name, body, RigMapping(soles=soles), recording, mass=1.0, skin_mass=volume)
-        return _weighed(_result(work), mass, volume, ())
+        return _weighed(result_of(work), mass, volume, ())
 
 
 def rest_bones(skeleton: Skeleton) -> dict[str, RestBone]:
@@ -250,13 +249,3 @@ def _weighed(motion: CharacterMotion, mass: float | None, volume: float, plates:
         raise InputError(f"the mass of '{motion.name}' is {mass:g} kg: give a positive mass in kg")
     weighed = replace(motion, mass=float(mass))
     return Body(weighed, weighed, source, tuple(plates))
-
-
-def _result(work: Generator[object, None, Result]) -> Result:
-    """What a computation in slices returns."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            result: Result = end.value
-            return result
