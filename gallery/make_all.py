@@ -11,6 +11,7 @@ from sample_scenes.make_all import build_all
 
 HEROES = (
     "snow_at_dusk",
+    "meadow",
     "path_after_rain",
     "tyre_and_boot",
     "dune_runner",

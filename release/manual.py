@@ -13,8 +13,8 @@ from markdown_it.token import Token
 FOLDER = "manual"
 """Where the pages are in the package."""
 
-_NOT_IN_IT = {"development", "gallery", "publishing"}
-"""Pages for those who make the add-on, and one that is only pictures."""
+_NOT_IN_IT = {"development", "gallery", "library", "publishing"}
+"""Pages for those who make the add-on or work without Blender, and one that is only pictures."""
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">

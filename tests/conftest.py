@@ -15,6 +15,17 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 
+def pytest_addoption(parser):
+    parser.addoption("--share", help="a part of the tests: 1/2 is the first, third, fifth ..., 2/2 the others")
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.option.share:
+        part, parts = map(int, config.option.share.split("/"))
+        config.hook.pytest_deselected(items=[item for at, item in enumerate(items) if at % parts != part - 1])
+        items[:] = items[part - 1 :: parts]
+
+
 def pytest_ignore_collect(collection_path, config):
     """Files without tests that run alone are left out where only those are asked for: to import all takes longer."""
     alone = config.option.markexpr.endswith("and alone")

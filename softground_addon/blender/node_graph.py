@@ -123,9 +123,11 @@ class NodeGraph:
         self.link(self.vector("ADD", position, self.scaled(up, height)), node.inputs["Position"])
         return node.outputs["Geometry"]
 
-    def store(self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT") -> Any:
-        """Give the selected vertices another value of that name."""
-        node = self.node("GeometryNodeStoreNamedAttribute", data_type=kind, domain="POINT")
+    def store(
+        self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT", domain: str = "POINT"
+    ) -> Any:
+        """Give the selected vertices, or what else a domain has, another value of that name."""
+        node = self.node("GeometryNodeStoreNamedAttribute", data_type=kind, domain=domain)
         self.link(name, node.inputs["Name"])
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])
@@ -354,6 +356,9 @@ class Number:
     def root(self) -> Number:
         return self._with("SQRT", 0.0)
 
+    def arccos(self) -> Number:
+        return self._with("ARCCOSINE", 0.0)
+
     def floor(self) -> Number:
         return self._with("FLOOR", 0.0)
 
@@ -377,4 +382,5 @@ _FUNCTIONS: Mapping[np.ufunc, Callable[..., Number]] = {
     np.expm1: lambda one: one.exp() - 1.0,
     np.log1p: lambda one: (one + 1.0).log(),
     np.sqrt: Number.root,
+    np.arccos: Number.arccos,
 }

@@ -13,7 +13,9 @@ from ..core.response.foot_holds import FootHold
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
-from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SceneUnits, SoleSource
+from ..core.rig.mapping import SoleSource
+from ..core.rig.recording import SceneUnits
+from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
 from . import tread_images

@@ -19,7 +19,12 @@ from .loads.cell_limits import Fineness
 from .loads.estimate import ForceModel
 from .response.foot_holds import FootHold
 from .response.response import GroundingOptions, TiltOptions
+from .rig.mapping import SoleSource
+from .rig.recording import SceneUnits
 from .weather.felt_weather import FeltWeather
+
+TIME_LIMIT = "Time Limit in Advanced > Mesh and Look, or --set longest_bake=N"
+"""By what the user sets `BakeSettings.longest_bake_s`."""
 
 
 class Acts(IntEnum):
@@ -49,37 +54,6 @@ class ObjectName:
 
     name: str
     uid: int
-
-
-@dataclass(frozen=True)
-class SoleSource:
-    """Sources of one sole.
-
-    Attributes
-    ----------
-    name : str
-        What the user sees, e.g. "foot.L".
-    side : str
-        "L", "R" or "".
-    bone : str
-        Bone of the armature that carries the sole; empty if an object does.
-    toe_bone : str
-        Bone of the toes; empty for a sole of one piece.
-    object : str
-        Name of an object that prints with its own mesh instead; empty if a bone does.
-    limb : bool
-        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
-    parts : tuple of str
-        The bones whose skin it is, where the skin has shown them; empty for the bone, its toes and what hangs on them.
-    """
-
-    name: str
-    side: str = ""
-    bone: str = ""
-    toe_bone: str = ""
-    object: str = ""
-    limb: bool = False
-    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,25 +98,6 @@ class ResponseOptions:
 
     tilt: TiltOptions | None
     grounding: GroundingOptions | None
-
-
-@dataclass(frozen=True)
-class SceneUnits:
-    """Frames and lengths of a scene.
-
-    Attributes
-    ----------
-    frame_rate : float
-        Scene frames per second [Hz].
-    time_stretch : float
-        Frames of the animation per frame of the scene.
-    gravity_m_s2, unit_scale_m : float
-    """
-
-    frame_rate: float
-    time_stretch: float
-    gravity_m_s2: float
-    unit_scale_m: float
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.pace import at_pace
+
 pytestmark = [pytest.mark.timeout(1500), pytest.mark.alone]  # by the time of the processor
 
 LONGEST_WAIT = 1.5
@@ -34,7 +36,7 @@ def test_all_prints_are_there_soon_after(facts):
 def test_all_prints_are_there_soon_after_on_a_screen_that_is_drawn_sixty_times_a_second(facts):
     """As a graphics card draws it, by the processor's time: the drawing is by software here, and takes far longer."""
     parts = facts["parts after letting go"]
-    assert sum(parts) + len(parts) * (PAUSE + 1 / 60) < LONGEST_WAIT
+    assert sum(parts) + len(parts) * (PAUSE + 1 / 60) < at_pace(LONGEST_WAIT)
 
 
 @pytest.mark.gui
@@ -45,7 +47,7 @@ def test_all_prints_are_there_after_it(facts):
 @pytest.mark.gui
 def test_nobody_waits_for_it(facts):
     assert facts["number of parts"] > 10
-    assert facts["parts"][0] < LONGEST_PART
+    assert facts["parts"][0] < at_pace(LONGEST_PART)
 
 
 @pytest.mark.gui

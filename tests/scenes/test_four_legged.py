@@ -149,8 +149,7 @@ class TestInBlender:
         from softground_addon.blender.sampling.rig_sampling import sample_character
         from softground_addon.core.ground.heightfield import FlatTerrain
         from softground_addon.core.loads.estimate import estimate_loads
-        from softground_addon.core.rig.mapping import RigMapping
-        from softground_addon.core.settings import SoleSource
+        from softground_addon.core.rig.mapping import RigMapping, SoleSource
         from tests.scenes.estimates import SNOW
 
         dog = Dog()

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from matplotlib import pyplot as plt
 
+from library.softground.trials import read_trial
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
 from tests.validation.through_blender import motion_of_bvh
-from tests.validation.trials import read_trial
 from tests.validation.validate import validate
 
 MASS = 75.0

@@ -17,14 +17,14 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from library.softground.scoring import plates_saw_everything, score
+from library.softground.trials import Trial, motion_of_trial, read_trial
 from softground_addon.core.dynamics import body_dynamics, centre_of_mass, centre_of_pressure, load_sharing
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads import contact_timing, contacts
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.estimate import estimate_loads
-from tests.validation.scoring import plates_saw_everything, score
-from tests.validation.trials import Trial, motion_of_trial, read_trial
 
 Array = NDArray[np.float64]
 

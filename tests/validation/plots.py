@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from tests.validation.trials import Trial
+from library.softground.trials import Trial
 
 Array = NDArray[np.float64]
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from library.softground.scoring import crossings, plates_saw_everything
+from library.softground.trials import motion_of_trial
 from softground_addon.core.events.events import events
-from tests.validation.scoring import crossings, plates_saw_everything
 from tests.validation.test_forces_of_gait import DATA, loads_of, read
-from tests.validation.trials import motion_of_trial
 
 pytestmark = pytest.mark.skipif(not DATA.exists(), reason=f"needs the reference data in {DATA}")
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from library.softground.scoring import Score, plates_saw_everything, score
+from library.softground.trials import Trial, motion_of_trial, read_trial
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.deviation import force_deviation
 from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
 from softground_addon.core.motion.motion import CharacterMotion
-from tests.validation.scoring import Score, plates_saw_everything, score
-from tests.validation.trials import Trial, motion_of_trial, read_trial
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "gait"
 WALK, RUN = "walk_subject01", "run_rajagopal"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.validation.scoring import PointScore, plates_saw_everything, score, score_points
+from library.softground.scoring import PointScore, plates_saw_everything, score, score_points
 
 WEIGHT, RATE = 700.0, 100.0
 

@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from library.softground import InputError
+from library.softground.markers import SIDES
+from library.softground.trials import motion_of_trial, read_marked
 from tests.core.capture.c3d_files import c3d_file
 from tests.core.capture.test_joint_centres import OPENSIM, joints
 from tests.validation import validate
-from tests.validation.trials import SIDES, motion_of_trial, read_c3d
 
 RATE, SAMPLES, MASS = 100.0, 10, 70.0
 
@@ -49,7 +51,7 @@ def trial(tmp_path):
     )
     path = tmp_path / "anna_walk.c3d"
     path.write_bytes(content)
-    return read_c3d(path)
+    return read_marked(path)
 
 
 def test_each_plate_bears_the_foot_that_stands_on_it(trial):
@@ -91,7 +93,7 @@ def test_a_trial_without_a_mass_says_where_to_write_it(tmp_path):
     path = tmp_path / "nobody.c3d"
     markers = marked()
     path.write_bytes(c3d_file(np.stack(list(markers.values()), axis=1), RATE, labels=list(markers)))
-    with pytest.raises(SystemExit, match=r"nobody\.json"):
-        read_c3d(path)
+    with pytest.raises(InputError, match=r"nobody\.json"):
+        read_marked(path)
     path.with_suffix(".json").write_text('{"mass_kg": 61}')
-    assert read_c3d(path).mass == 61
+    assert read_marked(path).mass == 61

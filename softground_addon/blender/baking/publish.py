@@ -25,7 +25,7 @@ from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.settings import Acts, BakeSettings
 from .. import settings
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, ground_mesh, trampled_ground
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
 from ..playback import display_key, playback
@@ -139,6 +139,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
+    trampled_ground.write(ground, footprints, made_with)
     return Published(ground, shown, error)
 
 

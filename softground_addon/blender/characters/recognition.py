@@ -6,21 +6,17 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.numerics.rigid import unit
-from ...core.numerics.slices import Slices
 from ...core.rig.bare_body import BareBody, with_toes
 from ...core.rig.bones import RigBones
-from ...core.rig.mapping import RigMapping, bones_of
+from ...core.rig.mapping import RigMapping, SoleSource, bones_of
 from ...core.rig.recording import Recording
-from ...core.rig.rig_skin import FollowedSkin, RigSkin, followed_skin
+from ...core.rig.rig_skin import RigSkin
+from ...core.rig.shown_contacts import shown_by_skin
 from ...core.rig.skin_mass import skin_mass
-from ...core.rig.skin_stances import UNDERSIDE
 from ...core.rig.sole_extraction import bone_families
-from ...core.settings import ObjectName, SoleSource
-from ...core.skin.contacts import SkinContacts, find_contacts
+from ...core.settings import ObjectName
 from .. import jobs
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
@@ -34,12 +30,6 @@ MOST_FRAMES = 500
 
 SHARE = 0.3
 """Of a reading of the whole shot, as it is shown to the user."""
-
-TURNED = 50.0
-"""A contact whose bone leans farther than this from how it mostly bears prints by other sides too [°]."""
-
-TURNED_SHARE = 0.2
-"""Share of the bearing time for which it does."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +101,7 @@ def recognise(
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
-    seen = yield from jobs.meanwhile(read, _shown_by_skin(bones, skin, recording))
+    seen = yield from jobs.meanwhile(read, shown_by_skin.slices(bones, skin, recording))
     return Recognised(replace(_joined(bones, skin, mapping, seen), mass=mass), skin, recording)
 
 
@@ -130,7 +120,7 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
     mass = yield from jobs.meanwhile(read, weighing)
-    seen = yield from jobs.meanwhile(read, _shown_by_skin(body.bones, body.skin, recording))
+    seen = yield from jobs.meanwhile(read, shown_by_skin.slices(body.bones, body.skin, recording))
     soles = with_toes(seen, recording)
     return Recognised(RigMapping(soles=soles, method="skin", mass=mass), body.skin, recording, body)
 
@@ -167,35 +157,3 @@ def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[Sol
         return RigMapping(soles=seen, method="skin")
     others = (replace(contact, limb=contact.limb or bool(mapping.soles)) for contact in left)
     return replace(mapping, soles=(*soles, *others))
-
-
-def _shown_by_skin(bones: RigBones, skin: RigSkin, recording: Recording) -> Slices[tuple[SoleSource, ...]]:
-    """The contacts that the skin shows."""
-    followed = yield from followed_skin.slices(skin, bones, recording, recording.units.frame_rate, linked=True)
-    if followed is None:
-        return ()
-    contacts = yield from find_contacts.slices(followed.motion)
-    bearing = np.flatnonzero(contacts.bears.any(axis=0))
-    sources = (_source(number, contacts, followed, recording) for number in bearing)
-    return tuple(source for source in sources if source)
-
-
-def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:
-    """One contact, carried by the bone with most of the skin that bears; None where no bone carries it."""
-    parts = np.flatnonzero((contacts.group == number) & np.array([*map(bool, followed.bones)]))
-    if not len(parts):
-        return None
-    bears = contacts.bears[:, number]
-    height = followed.motion.positions[bears][..., 2] - contacts.floor[bears, number, None]
-    low = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=0)
-    weight = np.bincount(followed.motion.part, low, len(followed.bones))
-    bones = [followed.bones[part] for part in parts]
-    main = followed.bones[int(parts[weight[parts].argmax()])]
-    return SoleSource(main, "", main, limb=_turns(recording, main, bears), parts=tuple(bones))
-
-
-def _turns(recording: Recording, bone: str, bears: NDArray[np.bool_]) -> bool:
-    """Return whether a bone bears in attitudes that differ much."""
-    axes = unit(np.swapaxes(recording.bone(bone)[bears, :3, :3], -1, -2)[..., 2])
-    usual = unit(np.median(axes, axis=0))
-    return bool((axes @ usual < np.cos(np.radians(TURNED))).mean() > TURNED_SHARE)

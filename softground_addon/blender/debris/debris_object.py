@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.debris import flight
 from ...core.debris.debris import Debris
 from ...core.ground import surfaces
-from ...core.settings import SceneUnits
+from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import inputs_of, modifier_with

@@ -23,6 +23,7 @@ from ...core.record.pressed_ground import GroundSample
 from ...core.settings import ObjectName
 from ..debris import debris_object
 from ..jobs import Job, Progress
+from ..plants import trampling_table
 from ..playback import own_data, playback
 from ..settings import exists, found, name_of
 from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
@@ -94,6 +95,7 @@ def clear(ground: bpy.types.Object) -> None:
     for obj in dict.fromkeys((ground, display_mesh_of(ground))):
         ground_checks.check_writable(obj)
     debris_object.remove(ground)
+    trampling_table.clear(ground)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
 from .. import mesh_arrays
+from ..plants import trampling_table
 from ..playback import display_key, own_data, playback, weather_modifier
 from ..playback.own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
 
@@ -34,8 +35,8 @@ def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
 
 
 def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers of the ground that play no bake and no weather over it."""
-    ours = (playback.modifier_of(ground), weather_modifier.modifier_of(ground))
+    """The modifiers of the ground that play no bake, no weather over it, and no plants that give way."""
+    ours = (playback.modifier_of(ground), weather_modifier.modifier_of(ground), trampling_table.modifier_of(ground))
     return [item for item in ground.modifiers if item not in ours]
 
 

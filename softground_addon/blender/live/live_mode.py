@@ -23,7 +23,7 @@ from ...core.ground.sparse_grid import Window
 from ...core.loads.cell_limits import check_cell_size
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
-from ...core.settings import Acts, BakeSettings
+from ...core.settings import TIME_LIMIT, Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report
 from ..baking.publish import at_the_end, publish, sign, with_debris
@@ -179,7 +179,7 @@ class LiveMode:
         if known is None:
             raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
-            check_cell_size(known.loads, asked.fineness, asked.longest_bake_s)
+            check_cell_size(known.loads, asked.fineness, asked.longest_bake_s, set_by=TIME_LIMIT)
         except InputError as error:  # the last ground stays shown
             self._refused = asked, str(error)
             return

@@ -26,6 +26,8 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.show_prints", icon="VIEWZOOM")
         layout.operator("softground.clear_bake", icon="TRASH")
         layout.operator("softground.apply_look", icon="MATERIAL")
+        layout.operator_menu_enum("softground.give_way", "kind", icon="STRANDS")
+        layout.operator("softground.add_sample_meadow", icon="STRANDS")
         layout.separator()
         layout.operator("softground.overlay", icon="HIDE_OFF")
         layout.operator("softground.predict_depth", icon="DRIVER_DISTANCE")

@@ -44,6 +44,7 @@ class SOFTGROUND_PT_output(AdvancedPanel, bpy.types.Panel):
         column.operator("softground.event_markers", icon="MARKER_HLT")
         column.operator("softground.event_points", icon="POINTCLOUD_DATA")
         column.operator("softground.make_sound", icon="SOUND")
+        layout.operator_menu_enum("softground.give_way", "kind", icon="STRANDS")
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 

@@ -12,7 +12,9 @@ from .weather_nodes import OF_WEATHER, WATER
 
 SOLE = "softground_sole"
 """Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
-ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, *OF_PLAYBACK, *OF_WEATHER)
+PASSES = "softground_passes"
+"""How many soles have trodden on a vertex, of grounds with plants that give way."""
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, PASSES, *OF_PLAYBACK, *OF_WEATHER)
 
 RECORD = "softground_record"
 SUMMARY = "softground_summary"

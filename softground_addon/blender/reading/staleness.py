@@ -18,6 +18,7 @@ from .. import settings
 from ..compat import SERIES
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..ground.baked_ground import display_mesh_of
+from ..plants import trampling_table
 from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
 from ..rigs.frame_ranges import ancestors, leaders
@@ -224,12 +225,13 @@ def _of_standing(ground: bpy.types.Object) -> str:
 
 
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:
-    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, weather never does."""
+    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, what follows it never."""
     played, weather = playback.modifier_of(ground), weather_modifier.modifier_of(ground)
+    after = (weather, trampling_table.modifier_of(ground))
     return [
         modifier.type
         for modifier in ground.modifiers
-        if modifier == played or (modifier.show_viewport and modifier != weather)
+        if modifier == played or (modifier.show_viewport and modifier not in after)
     ]
 
 

@@ -1,7 +1,6 @@
 """Roles of bones: joints and feet of an armature, from the names of the usual rigs, else from its rest pose.
 
-`bone_names` reads each name by itself; here bones with the same word are distinguished, and joints that the names leave
-out are completed from the rest pose.
+`core.rig.name_mapping` reads the names; here joints that they leave out are completed from the rest pose.
 """
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ from collections.abc import Iterable, Mapping
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from ...core.errors import InputError
 from ...core.findings import listed
 from ...core.rig.bones import RestBone, RigBones
-from ...core.rig.mapping import BoneEnd, RigMapping
-from ...core.settings import SoleSource
-from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
+from ...core.rig.mapping import BoneEnd, RigMapping, SoleSource
+from ...core.rig.name_mapping import map_by_names
 from .libraries import check_libraries
 from .rest_pose import map_by_rest_pose
 
@@ -48,8 +45,8 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
         If the object is no armature, or no feet are found by name or by rest pose.
     """
     require_armature(armature)
-    bones = armature.data.bones
-    mapping = _map_by_names(bones)
+    deforming = {bone.name for bone in armature.data.bones if bone.use_deform}
+    mapping = map_by_names(rest_bones(armature), deforming)
     if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
         shape = map_by_rest_pose(armature, posed=posed)
         if shape is not None:
@@ -174,113 +171,3 @@ def rest_bones(armature: bpy.types.Object) -> RigBones:
         )
         for bone in armature.data.bones
     }
-
-
-def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
-    """The mapping that the names give, or None where they name no foot."""
-    names = read_names(bones)
-    by_name = {bone.name: bone for bone in bones}
-    joints: dict[str, BoneEnd] = {}
-    soles = []
-    for side, suffix in (("L", "_l"), ("R", "_r")):
-        limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
-        _settle_ambiguities(limb, names, by_name, side)
-        foot, toe = limb["foot"], limb["toe"]
-        for joint, segment in _JOINT_HEADS.items():
-            if bone := limb[segment]:
-                joints[joint + suffix] = (bone, "head")
-        if "wrist" + suffix not in joints and limb["forearm"]:
-            joints["wrist" + suffix] = (limb["forearm"], "tail")
-        if foot or toe:
-            joints["toe" + suffix] = (toe or foot, "tail")
-            soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
-    if not soles:
-        return None
-    joints.update(_map_trunk(names, by_name, joints))
-    return RigMapping(joints=joints, soles=tuple(soles))
-
-
-_JOINT_HEADS = {
-    "hip": "thigh",
-    "knee": "shin",
-    "ankle": "foot",
-    "ball": "toe",
-    "shoulder": "upper_arm",
-    "elbow": "forearm",
-    "wrist": "hand",
-}
-"""Joint to the segment whose head it is."""
-
-
-def _settle_ambiguities(
-    limb: dict[str, str], names: list[BoneName], bones: Mapping[str, bpy.types.Bone], side: str
-) -> None:
-    """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
-    knee, leg = (best(names, (word,), side) for word in ("knee", "leg"))
-    if knee and leg and _is_ancestor(bones, leg, knee):
-        limb["shin"] = knee
-        limb["thigh"] = limb["thigh"] if limb["thigh"] and _is_ancestor(bones, limb["thigh"], leg) else leg
-    ankle, foot = (best(names, (word,), side) for word in ("ankle", "foot"))
-    if ankle and foot and _is_ancestor(bones, ankle, foot):
-        limb["foot"] = ankle
-        limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
-    toe, foot = limb["toe"], limb["foot"]
-    if toe and foot and (_is_ancestor(bones, toe, foot) or bones[foot].use_deform > bones[toe].use_deform):
-        limb["toe"] = ""
-
-
-_HIPS_OF_SOME = ("root", "cog", "spine")
-"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
-
-
-def _map_trunk(
-    names: list[BoneName], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, BoneEnd]
-) -> dict[str, BoneEnd]:
-    """Hips, spine, neck and head; the hips may also be where the thighs meet."""
-    by_joint = {joint: best(names, words, "") for joint, words in TRUNK.items()}
-    thighs = [bones[limbs[joint][0]] for joint in ("hip_l", "hip_r") if joint in limbs]
-    if not by_joint["hips"] or not bones[by_joint["hips"]].use_deform:
-        candidates = [by_joint["hips"], *(best(names, (word,), "") for word in _HIPS_OF_SOME)]
-        candidates.append(_common_ancestor([thigh.name for thigh in thighs], bones))
-        by_joint["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones)
-    top = by_joint["neck"] or by_joint["head"]
-    if by_joint["hips"] and top:
-        chain = _ancestors(bones, top)
-        if by_joint["hips"] in chain:
-            above = chain[: chain.index(by_joint["hips"])]
-            words = {name.bone: name.word for name in names}
-            trunk = [bone for bone in above if words.get(bone) not in TRUNK["neck"]]
-            by_joint["spine"] = trunk[-1] if trunk else ""
-    if by_joint["spine"] == by_joint["hips"]:
-        spines = sorted(
-            (name.number, name.bone)
-            for name in names
-            if name.word == "spine" and name.deforms and name.bone != by_joint["hips"]
-        )
-        by_joint["spine"] = spines[0][1] if spines else ""
-    return {joint: (bone, "head") for joint, bone in by_joint.items() if bone}
-
-
-def _ancestors(bones: Mapping[str, bpy.types.Bone], name: str) -> list[str]:
-    """Names of a bone's parents, nearest first."""
-    return [bone.name for bone in bones[name].parent_recursive]
-
-
-def _is_ancestor(bones: Mapping[str, bpy.types.Bone], ancestor: str, descendant: str) -> bool:
-    return ancestor in _ancestors(bones, descendant)
-
-
-def _common_ancestor(names: list[str], bones: Mapping[str, bpy.types.Bone]) -> str:
-    """Nearest bone that all of the given ones hang from; empty if there is none."""
-    if not names:
-        return ""
-    chains = [_ancestors(bones, name) for name in names]
-    return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")
-
-
-def _nearest_to_thighs(candidates: list[str], thighs: list[bpy.types.Bone], bones: Mapping[str, bpy.types.Bone]) -> str:
-    """The bone that starts nearest to the middle between the thighs, deforming ones first; empty without candidates."""
-    if not thighs or not candidates:
-        return candidates[0] if candidates else ""
-    middle = sum((thigh.head_local for thigh in thighs), start=Vector()) / len(thighs)
-    return min(candidates, key=lambda name: (not bones[name].use_deform, (bones[name].head_local - middle).length))

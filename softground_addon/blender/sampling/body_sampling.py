@@ -15,8 +15,8 @@ from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.bare_body import BareBody, bare_body, body_motion, recorded
 from ...core.rig.mapping import RigMapping
-from ...core.rig.recording import Recording
-from ...core.settings import ObjectName, SceneUnits
+from ...core.rig.recording import Recording, SceneUnits
+from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.motion.motion import Array
 from ...core.motion.sole_motion import SoleMotion
-from ...core.settings import SoleSource
+from ...core.rig.mapping import SoleSource
 from ...core.soles.prop_motion import prop_motion
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries

@@ -10,8 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.findings import Finding
-from ...core.rig.recording import Recording
-from ...core.settings import SceneUnits
+from ...core.rig.recording import Recording, SceneUnits
 from ..animation_layer.constraint_layer import LayerKind, without_layers
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents

@@ -16,10 +16,9 @@ from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
-from ...core.rig.recording import Recording
+from ...core.rig.recording import Recording, SceneUnits
 from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import LONGEST, skin_stances
-from ...core.settings import SceneUnits
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
 from ..rigs.rig_mapping import rest_bones

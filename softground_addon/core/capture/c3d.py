@@ -9,6 +9,8 @@ samples, in the number formats of three families of processors.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,8 +64,20 @@ def read(content: bytes) -> Capture:
     InputError
         If it is no C3D file, is cut short, or contradicts itself.
     """
-    try:
+    with _told_as_damage():
         return _read(content)
+
+
+def parameters(content: bytes) -> Parameters:
+    """The parameters of a C3D file; raises as `read` does."""
+    with _told_as_damage():
+        return _parameters(content)[0]
+
+
+@contextmanager
+def _told_as_damage() -> Iterator[None]:
+    try:
+        yield
     except (struct.error, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"the C3D file is damaged ({error}): export it again") from error
 

@@ -18,7 +18,7 @@ from ..numerics.slices import Slices
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
-from ..settings import BakeSettings
+from ..settings import TIME_LIMIT, BakeSettings
 from .edited_steps import with_edits
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
 from .shot_loads import loads_of_shot
@@ -114,7 +114,7 @@ def _simulate(
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
+    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s, set_by=TIME_LIMIT)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     for result in simulate(loads, ground, wanted.cell_size_m):

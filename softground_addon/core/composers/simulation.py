@@ -251,7 +251,7 @@ class TimeGrid:
 
 def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
     if not loads:
-        raise InputError("There is no character to bake: add one with 'Add Character'.")
+        raise InputError("There are no loads to press: give those of at least one body.")
     motions = [character.motion for character in loads]
     first = min(motion.frames[0] for motion in motions)
     spacing = max(motion.time_step * motion.frame_rate for motion in motions)

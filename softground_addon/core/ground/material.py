@@ -46,7 +46,7 @@ class GroundMaterial:
     repose_angle : float
         Steepest slope that loose ground keeps [rad]; what is steeper slides down.
     shortest_time : float
-        Time in which the ground gives way under a fast landing [s]: tau = 2·dL/|v_n|, as if a sole that lands at the
+        Time in which the ground gives way under a fast landing [s]: tau = `2·dL/|v_n|`, as if a sole that lands at the
         speed v_n came evenly to rest over the depth dL, from this to the characteristic time.
     hardening : float
         How much stiffer compacted ground is against a further contact; see `compress`.

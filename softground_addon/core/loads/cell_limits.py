@@ -155,6 +155,8 @@ def check_cell_size(
     fine: Fineness,
     longest: float,
     available: float | None = None,
+    *,
+    set_by: str = "",
 ) -> None:
     """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
@@ -166,6 +168,8 @@ def check_cell_size(
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
+    set_by : str, optional
+        By what the user sets the longest time, for the message.
     """
     cell_size = fine.cell_size
     for character in loads:
@@ -182,7 +186,7 @@ def check_cell_size(
     def taken(size: float) -> tuple[float, float]:
         return coverage.bake_costs(replace(fine, cell_size=size))
 
-    too_much = _too_much(*taken(cell_size), longest, available)
+    too_much = _too_much(*taken(cell_size), longest, available, set_by)
     if not too_much:
         return
     sizes = cell_size * 1.05 ** np.arange(300)
@@ -202,7 +206,9 @@ def _shortest_of_largest(loads: Sequence[CharacterLoads]) -> float:
     return min(max(sole.sole.length for sole in character.motion.soles) for character in loads)
 
 
-def check_frames(first: int, last: int, characters: int, longest: float, available: float | None = None) -> None:
+def check_frames(
+    first: int, last: int, characters: int, longest: float, available: float | None = None, *, set_by: str = ""
+) -> None:
     """Raise InputError if so many frames of so many characters do not fit into memory or time; says what they take.
 
     Parameters
@@ -213,11 +219,13 @@ def check_frames(first: int, last: int, characters: int, longest: float, availab
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
+    set_by : str, optional
+        By what the user sets the longest time, for the message.
     """
     available = machine_memory() if available is None else available
     count = last - first + 1
     needed, time = count * characters * BYTES_PER_FRAME, count * characters / FRAMES_PER_SECOND
-    too_much = _too_much(needed, time, longest, available)
+    too_much = _too_much(needed, time, longest, available, set_by)
     if too_much:
         raise InputError(
             f"The {count:,} frames from {first} to {last} would take about {_amount(needed, time)}, and {too_much}: "
@@ -225,12 +233,12 @@ def check_frames(first: int, last: int, characters: int, longest: float, availab
         )
 
 
-def _too_much(needed: float, time: float, longest: float, available: float | None) -> str:
+def _too_much(needed: float, time: float, longest: float, available: float | None, set_by: str = "") -> str:
     """Which limit memory [bytes] or time [s] are beyond; empty where neither is."""
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:
-        return f"{duration(longest)} are allowed (Time Limit in Advanced > Mesh and Look, or --set longest_bake=N)"
+        return f"{duration(longest)} are allowed{set_by and f' ({set_by})'}"
     return ""
 
 

@@ -28,6 +28,16 @@ class Sliced(Protocol[Parameters, Result_co]):
         """The computation, to be gone through slice by slice."""
 
 
+def result_of(work: Generator[object, None, Result]) -> Result:
+    """What a computation returns at its end, whatever it yields before."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
+
+
 def sliced(slices: Callable[Parameters, Slices[Result]]) -> Sliced[Parameters, Result]:
     """Make a function of a computation in slices.
 
@@ -46,13 +56,7 @@ def sliced(slices: Callable[Parameters, Slices[Result]]) -> Sliced[Parameters, R
 
     @wraps(slices)
     def whole(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        work = slices(*args, **kwargs)
-        while True:
-            try:
-                next(work)
-            except StopIteration as end:
-                result: Result = end.value
-                return result
+        return result_of(slices(*args, **kwargs))
 
     function = cast("Sliced[Parameters, Result]", whole)
     function.slices = slices  # type: ignore[method-assign]

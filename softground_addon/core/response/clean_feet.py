@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..legs.foot_lock import lock, moved, slides, travelling, underside_on
-from ..legs.foot_placement import Placement, place_sole
+from ..legs.foot_placement import Placement, between_contacts, place_sole
 from ..legs.grounding import Response, has_ankle, leg_of, leg_soles, stand, with_sole
 from ..legs.sole_rim import posed_rim
 from ..loads.contacts import REST_SPEED
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import runs
-from ..numerics.rigid import carried
+from ..numerics.orientation import rotation_vectors
+from ..numerics.rigid import carried, displacement, rotation
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
@@ -26,12 +27,11 @@ Mask = NDArray[np.bool_]
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
-ONE_PIECE_PASSES = 128
+ONE_PIECE_PASSES = 32
 """Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
-stand on other points. Those count that move least, as knees that reach their pace may give way otherwise."""
-IN_PLACE = 1e-4
+stand on other points. Each begins midway between where the last began and ended, as points take turns at bearing."""
+IN_PLACE = 3e-4
 """Feet that move less than this from one time to the next are where they belong, in leg lengths."""
-
 
 RESTING = 0.5
 """Toes rest that are slower than this part of the body that goes on over them."""
@@ -129,20 +129,36 @@ def clean(
     if stands is None:
         stands = yield from standing.slices(motion, touching, terrain, holds)
     response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, {})
-    middles = {side: leg_of(motion, side, sole).ankle for side, sole in leg_soles(motion).items()}
-    of_one_piece = [side for side in middles if not has_ankle(motion, side)]
+    soles = {side: sole for side, sole in leg_soles(motion).items() if not has_ankle(motion, side)}
+    touches = {side: touching[:, sole] for side, sole in soles.items() if touching[:, sole].any()}
+    middles = {side: leg_of(motion, side, soles[side]).ankle for side in touches}
+    so_far = {side: _eased(touches[side], middles[side], response.legs[side].foot) for side in touches}
     settled, least = response, np.inf
-    for _ in range(ONE_PIECE_PASSES if of_one_piece else 0):
-        so_far = {side: response.legs[side].foot for side in of_one_piece}
+    for _ in range(ONE_PIECE_PASSES if touches else 0):
         response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
         moves = [
-            carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]) for side in so_far
+            (carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]))[touches[side]]
+            for side in touches
         ]
-        largest = float(np.abs(moves).max())
+        largest = max(float(np.abs(move).max()) for move in moves)
         settled, least = (response, largest) if largest < least else (settled, least)
         if largest < IN_PLACE * motion.leg_length:
             break
+        so_far = {
+            side: _eased(touches[side], middles[side], so_far[side], response.legs[side].foot) for side in touches
+        }
     return settled
+
+
+def _eased(touching: Mask, middle: Array, *carries: Array) -> Array:
+    """The mean of displacements (F, 4, 4) of a foot with its middle at (F, 3) in its contacts, passing smoothly between
+    them."""
+    turns = np.mean([rotation_vectors(carry[:, :3, :3]) for carry in carries], axis=0)
+    moves = np.mean([carried(carry, middle) - middle for carry in carries], axis=0)
+    turns, moves = (
+        np.stack([between_contacts(each[:, i], touching) for i in range(3)], axis=-1) for each in (turns, moves)
+    )
+    return displacement(rotation(turns), middle, middle + moves)
 
 
 @sliced

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from ..motion.motion import CENTRE, Array, CharacterMotion
 from ..numerics.rigid import unit
 from ..numerics.slices import Slices, sliced
-from ..settings import SceneUnits, SoleSource
 from ..skin.rigid_parts import moves_as_one, rigid_motions, rigid_parts
 from .bones import RestBone, RigBones
-from .mapping import RigMapping
+from .mapping import RigMapping, SoleSource
 from .motion_assembly import assemble_motion
-from .recording import Recording
+from .recording import Recording, SceneUnits
 from .rig_skin import Indices, RigSkin
 from .skin_mass import centre_of_volume
 from .skin_stances import LONGEST, skin_stances

@@ -5,10 +5,39 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..settings import SoleSource
-
 BoneEnd = tuple[str, str]
 """A bone's name, and "head" or "tail"."""
+
+
+@dataclass(frozen=True)
+class SoleSource:
+    """Sources of one sole.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "".
+    bone : str
+        Bone of the armature that carries the sole; empty if an object does.
+    toe_bone : str
+        Bone of the toes; empty for a sole of one piece.
+    object : str
+        Name of an object that prints with its own mesh instead; empty if a bone does.
+    limb : bool
+        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
+    parts : tuple of str
+        The bones whose skin it is, where the skin has shown them; empty for the bone, its toes and what hangs on them.
+    """
+
+    name: str
+    side: str = ""
+    bone: str = ""
+    toe_bone: str = ""
+    object: str = ""
+    limb: bool = False
+    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

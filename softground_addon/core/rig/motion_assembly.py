@@ -13,7 +13,6 @@ from ..motion.props import capsule
 from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import displacement, nearest_rotation, unit
-from ..settings import SoleSource
 from ..soles.foot_attitude import (
     UP,
     FlatFoot,
@@ -27,7 +26,7 @@ from ..soles.foot_attitude import (
 )
 from ..soles.soles import PlacedSole, prop_sole
 from .bones import RigBones, extent, stature
-from .mapping import RigMapping
+from .mapping import RigMapping, SoleSource
 from .recording import Recording
 from .rig_at_rest import RestPose
 from .rig_skin import RigSkin

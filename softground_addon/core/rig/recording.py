@@ -9,10 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import Array
-from ..settings import SceneUnits
 
 _STILL = 1e-4
 """Poses that differ by less are one, over their largest entry."""
+
+
+@dataclass(frozen=True)
+class SceneUnits:
+    """Frames and lengths of a scene.
+
+    Attributes
+    ----------
+    frame_rate : float
+        Scene frames per second [Hz].
+    time_stretch : float
+        Frames of the animation per frame of the scene.
+    gravity_m_s2, unit_scale_m : float
+    """
+
+    frame_rate: float
+    time_stretch: float
+    gravity_m_s2: float
+    unit_scale_m: float
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from ..motion.motion import LowSkin
 from ..numerics.slices import Slices
-from ..settings import SoleSource
 from ..skin.contacts import find_contacts
 from .bones import RigBones
-from .mapping import RigMapping
+from .mapping import RigMapping, SoleSource
 from .recording import Recording
 from .rig_skin import FollowedSkin, RigSkin, followed_skin, skinned
 from .sole_extraction import FootMesh, bone_families, limb_family

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import Array
-from ..settings import SoleSource
 from ..soles.foot_attitude import FlatFoot, FootSize
 from ..soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
 from .bones import RigBones, family
-from .mapping import RigMapping
+from .mapping import RigMapping, SoleSource
 from .rig_skin import RigSkin
 
 _OWNED = 0.5

@@ -47,9 +47,7 @@ def prop_motion(
     stretch = turn.T @ matrices[0, :3, :3]
     sizes = np.linalg.svd(stretch, compute_uv=False)
     if not sizes.min() > _FLAT * max(sizes.max(), 1e-300):
-        raise InputError(
-            f"'{owner}' has a scale of zero: set its scale, or apply it (Object > Apply > Scale), also on its parents."
-        )
+        raise InputError(f"'{owner}' has a scale of zero: set its scale, or that of its parents.")
     rotation = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(stretch))
     change = np.abs(matrices[:, :3, :3] - rotation @ stretch).max(axis=(1, 2)) / sizes.max()
     if change.max() > _SAME_SIZE:

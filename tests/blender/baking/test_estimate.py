@@ -14,16 +14,15 @@ from tests.blender import fingerprints, shots
 
 CASES = [
     (1.0, 0.02, 48),
-    (1.0, 0.005, 480),
     (1.0, 0.0015, 48),
-    (4.0, 0.02, 96),
-    (0.3, 0.0015, 96),
     (0.1, 0.001, 24),
     (0.1, 0.001, 240),
     (0.03, 0.0005, 48),
     (0.01, 0.001, 96),
 ]
 """Scale of the figure, cell size [m], frames."""
+
+LONG_CASES = [(1.0, 0.005, 480), (4.0, 0.02, 96), (0.3, 0.0015, 96)]
 
 RETURNED = {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
 """Has a process give memory back at once, so that what it holds is what is in use; it is slower then."""
@@ -35,10 +34,16 @@ def taken(case, **environment):
     return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("RESULT")).partition(" ")[2])
 
 
-@pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read as on Linux")
-@pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(f"{value:g}" for value in case))
+@pytest.mark.parametrize(
+    "case",
+    [
+        *(pytest.param(case, marks=pytest.mark.slow) for case in CASES),
+        *(pytest.param(case, marks=pytest.mark.marathon) for case in LONG_CASES),
+    ],
+    ids=lambda case: "-".join(f"{value:g}" for value in case),
+)
 def test_the_estimate_is_within_a_factor_of_two(case):
     for what, (estimated, measured) in (
         ("time", taken(case)["time"]),

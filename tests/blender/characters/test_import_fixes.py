@@ -112,7 +112,10 @@ def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
     assert belt.parent.name == "Walker Travel"
 
 
-@pytest.mark.parametrize("scale", slow_but_one([12.5, 39.4, 100.0, 0.0254, 0.01]))
+@pytest.mark.parametrize(
+    "scale",
+    [*slow_but_one([12.5, 39.4, 100.0, 0.0254]), pytest.param(0.01, marks=pytest.mark.marathon)],  # takes minutes
+)
 def test_the_button_works_that_a_warning_names_of_a_rig_that_was_scaled_after_it_was_added(scene, scale):
     armature = shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()

@@ -11,8 +11,7 @@ from softground_addon.blender.jobs import run
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
 from softground_addon.core.errors import InputError
-from softground_addon.core.rig.mapping import RigMapping
-from softground_addon.core.settings import SoleSource
+from softground_addon.core.rig.mapping import RigMapping, SoleSource
 from tests.blender import fingerprints, rigs, shots
 from tests.blender.bvh import Bvh, file_to_world
 

@@ -10,8 +10,8 @@ import pytest
 from softground_addon.blender.jobs import run
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.core.rig.mapping import SoleSource
 from softground_addon.core.rig.motion_assembly import _pointing
-from softground_addon.core.settings import SoleSource
 from tests.blender import rigs
 
 BLENDER = rigs.FAMILIES["blender"]

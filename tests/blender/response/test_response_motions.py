@@ -72,9 +72,18 @@ def put_ground(scene, motion, shape):
     scene.view_layers[0].update()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", GROUNDS)
-@pytest.mark.parametrize("name", [*shots.MOTION_FILES, "walker"])
+LONG = {"zombie", "jumping", "dance"}
+"""Motions whose bakes take long: on the flat in the slow tests, on the other grounds in the marathon."""
+
+
+def tier(name, kind):
+    return pytest.mark.marathon if name in LONG and kind != "flat snow" else pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [pytest.param(name, kind, marks=tier(name, kind)) for name in [*shots.MOTION_FILES, "walker"] for kind in GROUNDS],
+)
 def test_standing_soles_lie_on_the_ground_legs_reach_and_knees_do_not_flip(scene, name, kind):
     shape, material = GROUNDS[kind]
     armature = shots.walker(scene, frames=120) if name == "walker" else shots.import_motion(name)

@@ -228,7 +228,7 @@ def work(folder, sessions):
 
 @pytest.mark.slow
 def test_random_sessions(addon, tmp_path):
-    work(tmp_path, 25)
+    work(tmp_path, 12)
 
 
 @pytest.mark.marathon

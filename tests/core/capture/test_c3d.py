@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from library.softground.plates import free_moment
 from softground_addon.core.capture import c3d
 from softground_addon.core.errors import InputError
 from tests.core.capture.c3d_files import DEC, INTEL, SGI, c3d_file
-from tests.core.capture.free_moments import free_moment
 from tests.core.capture.memory import taking_no_more_than
 
 FRAMES, SAMPLES = 20, 10

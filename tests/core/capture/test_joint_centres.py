@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from library.softground.plates import free_moment
 from softground_addon.core.capture import trc
 from softground_addon.core.capture.captured import Capture, Plate
 from softground_addon.core.capture.joint_centres import UPWARD, captured_body
 from softground_addon.core.errors import InputError
-from tests.core.capture.free_moments import free_moment
 from tests.core.capture.memory import taking_no_more_than
 
 FRAMES = 30

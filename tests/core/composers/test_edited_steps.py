@@ -23,6 +23,7 @@ from softground_addon.core.record.mesh_sole import MeshSole
 from softground_addon.core.record.record import BakeRecord
 from softground_addon.core.soles.soles import sole_from_underside
 from tests.core.walkers import FOOT_LENGTH, box_sole, foot_sole, pose, pressed, standing, walk
+from tests.pace import at_pace
 
 SOIL = GroundMaterial(0.3e6, 0.35, 0.15)
 MATERIALS = {
@@ -367,4 +368,4 @@ def test_one_step_of_a_thousand_is_edited_in_50_ms():
         steps.pressed_again({number: StepEdit(move_m=(0.1, 0.0), turn_deg=5.0)})
         took.append(time.thread_time() - start)
     print(f"one step of {len(left.footprints)}: {1e3 * np.median(took):.1f} ms, at most {1e3 * max(took):.1f} ms")
-    assert np.median(took) < 0.05
+    assert np.median(took) < at_pace(0.05)

@@ -394,7 +394,7 @@ def test_characters_on_different_time_grids_are_refused_with_a_remedy():
 
 
 def test_nobody_and_no_cell_size_are_refused_with_a_remedy():
-    with pytest.raises(InputError, match="add one"):
+    with pytest.raises(InputError, match="no loads to press"):
         next(simulate([], SoftGround(FlatTerrain(), SNOW), 0.01))
     with pytest.raises(InputError, match="cell size"):
         next(simulate([walk()], SoftGround(FlatTerrain(), SNOW), -inf))

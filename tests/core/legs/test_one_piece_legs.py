@@ -69,6 +69,7 @@ def test_their_feet_stand_without_slide_or_gap_and_their_parts_stay_whole(slide,
             np.testing.assert_allclose(lengths[1], lengths[0], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_foot_lock_without_strength_leaves_them_where_they_are():
     motion, touching = blocks(0.03)
     first = np.flatnonzero(touching[:, 0])[0]

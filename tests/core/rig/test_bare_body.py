@@ -7,9 +7,9 @@ import pytest
 
 from softground_addon.core.motion.motion import CENTRE
 from softground_addon.core.rig.bare_body import bare_body, body_motion, recorded
-from softground_addon.core.rig.mapping import RigMapping
+from softground_addon.core.rig.mapping import RigMapping, SoleSource
+from softground_addon.core.rig.recording import SceneUnits
 from softground_addon.core.rig.skin_mass import DENSITY, skin_mass
-from softground_addon.core.settings import SceneUnits, SoleSource
 
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]) / 2
 FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])

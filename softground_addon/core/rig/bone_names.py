@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
-import bpy
+from .bones import RigBones, above
 
 LIMBS: Mapping[str, tuple[str, ...]] = {
     "thigh": (
@@ -112,17 +112,22 @@ class BoneName:
     depth: int
 
 
-def read_names(bones: Iterable[bpy.types.Bone]) -> list[BoneName]:
-    """The names that can name a part of the body; those of controls and helpers are left out."""
-    split = {bone.name: _split(bone.name) for bone in bones}
+def read_names(bones: RigBones, deforming: Set[str]) -> list[BoneName]:
+    """The names that can name a part of the body; those of controls and helpers are left out.
+
+    Parameters
+    ----------
+    bones : RigBones
+    deforming : set of str
+        Names of those that move a mesh.
+    """
+    split = {name: _split(name) for name in bones}
     first = Counter(words[0] for words in split.values() if len(words) > 1)
     shared = {word for word, count in first.items() if count > _COMMON_PREFIX_SHARE * len(split) and len(split) > 4}
     names = []
-    for bone in bones:
-        words = split[bone.name]
-        if words and words[0] in shared:
-            words = words[1:]
-        name = _read(bone, words)
+    for bone, words in split.items():
+        kept = words[1:] if words and words[0] in shared else words
+        name = _read(bone, kept, deforms=bone in deforming, depth=len([*above(bones, bone)]))
         if name:
             names.append(name)
     return names
@@ -161,8 +166,8 @@ def _split(name: str) -> list[str]:
     return [word.lower() for word in _WORDS.findall(name.rsplit(":", 1)[-1])]
 
 
-def _read(bone: bpy.types.Bone, words: list[str]) -> BoneName | None:
-    if not words or bone.name.startswith("c_") or _DISTRACTIONS.intersection(words):
+def _read(bone: str, words: list[str], *, deforms: bool, depth: int) -> BoneName | None:
+    if not words or bone.startswith("c_") or _DISTRACTIONS.intersection(words):
         return None
     side, decoration = "", 0
     parts: list[str] = []
@@ -181,7 +186,7 @@ def _read(bone: bpy.types.Bone, words: list[str]) -> BoneName | None:
     if not side:
         side, word = _glued_side(word)
     number = int("".join(map(str, numbers))) if numbers else -1
-    return BoneName(bone.name, side, word, number, decoration, bone.use_deform, len(bone.parent_recursive))
+    return BoneName(bone, side, word, number, decoration, deforms, depth)
 
 
 def _glued_side(word: str) -> tuple[str, str]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.numerics.intervals import runs
+from ._core.numerics.intervals import runs
+from .plates import LOADED
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LOADED = 20.0
-"""A plate is loaded above this vertical force [N]."""
 EVENT_REACH = 0.15
 """An estimated event farther than this from the measured one is another event [s]."""
 EDGE = 0.06
@@ -93,7 +92,7 @@ def plates_saw_everything(measured: Array, touching: Mask, *, weight: float, rat
     hidden = (surely_on & ~loaded & ~missed).any(axis=1)
     for first, last in zip(*runs(measured.sum(axis=1) < weight), strict=True):
         hidden[first:last] |= hidden[first:last].sum() > reach
-    return ~(hidden | (missed | surely_off & loaded).any(axis=1))
+    return np.asarray(~(hidden | (missed | surely_off & loaded).any(axis=1)))
 
 
 def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rate: float) -> Score:
@@ -156,7 +155,7 @@ def crossings(force: Array) -> tuple[Array, Array]:
     first, last = first[first > 0], last[last < len(force)]
 
     def between(frame: NDArray[np.intp]) -> Array:
-        return frame - 1 + (LOADED - force[frame - 1]) / (force[frame] - force[frame - 1])
+        return np.asarray(frame - 1 + (LOADED - force[frame - 1]) / (force[frame] - force[frame - 1]))
 
     return between(first), between(last)
 

@@ -1,0 +1,105 @@
+"""A walk through a meadow toward a low sun: grass lies where boots trod, and rises behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from gallery import broadleaf, open_air, outfit
+from sample_scenes import production, stage
+from sample_scenes.body import Body
+from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.stage import Array
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.plants import meadow
+
+CELL_SIZE: float | None = None
+"""Fitted to the soles."""
+
+PRESET = "Soil"
+FRAMES = 190
+START = 1.2  # m along y; the walk is toward -y
+PICTURE = (1280, 720)
+EYE = (0.42, 1.45, 0.92)
+TUFTS, NEAREST, FARTHEST = 42_000, 0.9, 26.0
+"""Tufts of grass, of which as many stand in each octave of distance from the camera [m]."""
+HEIGHT = open_air.rolling(swell=0.18, hills=18.0, seed=5)
+
+
+@dataclass(frozen=True)
+class Meadow:
+    """One long walk."""
+
+    bakes: dict[str, Bake]
+
+
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Meadow:
+    """A wide ground, and a walk away from the camera."""
+    ground = open_air.add_ground(scene, "Meadow", (-26.0, START + 3.0), HEIGHT, "soil", {"growth": _growth})
+    scene.render.resolution_x, scene.render.resolution_y = PICTURE
+    open_air.add_camera(scene, EYE, (-0.12, -2.2, 0.10), 30.0, (0.0, -0.9, 0.1), 16.0)
+    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, {"relief": "OFF"} | dict(options or {}))
+    return Meadow({PRESET: bake})
+
+
+def claims(built: Meadow) -> list[Claim]:
+    """A track under grass."""
+    return [Claim("Steps in the meadow", len(built.bakes[PRESET].footprints), 10, 40)]
+
+
+def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
+    """From the height of a child, against the evening sun."""
+    scene = bpy.context.scene
+    open_air.add_low_sun(scene, radians(62), radians(13), (1.0, 0.74, 0.48), 10.0, 0.26, open_air.PALE_DUSK)
+    chance = np.random.default_rng(3)
+    grass = meadow.planted(_tufts(chance), chance, 1.0)
+    scene.collection.objects.link(grass)
+    _colour(grass)
+    production.make_active(grass)
+    bpy.ops.softground.give_way(kind="MEADOW")
+    for material in baked_ground.display_mesh_of(scene.softground.ground).data.materials:
+        open_air.overgrow(material, "growth", meadow.DARK, meadow.LIGHT)
+    spots = np.column_stack([chance.normal(0.0, 45.0, 90), -chance.uniform(38.0, 110.0, 90)])
+    leaves = (0.030, 0.045, 0.010), (0.12, 0.14, 0.035)
+    broadleaf.add_broadleaves(spots, chance.uniform(3.0, 8.0, 90), HEIGHT, *leaves, stem=0.15, seed=40)
+    hiker = bpy.data.objects["Hiker"]
+    outfit.wear_creased(hiker, Body())
+    outfit.wear_rucksack(hiker, Body())
+    scene.frame_set(scene.frame_end)
+    scene.view_settings.exposure, scene.render.image_settings.quality = 1.2, 85
+    path = folder / "meadow.jpg"
+    stage.render(scene, scene.camera, path, PICTURE, samples)
+    return [path]
+
+
+def _growth(x: Array, y: Array) -> Array:
+    """Share of the ground that is green from afar: all of it."""
+    return np.ones(np.broadcast(x, y).shape)
+
+
+def _tufts(chance: np.random.Generator) -> Array:
+    """Places of tufts before the camera, (N, 3) [m], ever fewer of a square metre with distance."""
+    away = np.geomspace(NEAREST, FARTHEST, TUFTS) * chance.uniform(0.95, 1.05, TUFTS)
+    turn = chance.uniform(radians(-48.0), radians(48.0), TUFTS)
+    x, y = EYE[0] - 0.18 * away + away * np.sin(turn), EYE[1] - away * np.cos(turn)
+    return np.column_stack([x, y, HEIGHT(x, y)])
+
+
+def _colour(grass: bpy.types.Object) -> None:
+    """Let light through the blades."""
+    tree = grass.data.materials[0].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shines, both = tree.nodes.new("ShaderNodeBsdfTranslucent"), tree.nodes.new("ShaderNodeMixShader")
+    both.inputs[0].default_value = 0.45
+    tree.links.new(shader.inputs["Base Color"].links[0].from_socket, shines.inputs["Color"])
+    tree.links.new(shader.outputs[0], both.inputs[1])
+    tree.links.new(shines.outputs[0], both.inputs[2])
+    tree.links.new(both.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+
+
+if __name__ == "__main__":
+    production.main(__name__)

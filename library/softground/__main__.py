@@ -1,0 +1,7 @@
+"""`python -m softground`: the command line."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())

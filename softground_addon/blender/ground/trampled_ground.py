@@ -1,0 +1,26 @@
+"""What plants need of a bake: the table by which they give way, and how often each vertex was trodden on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ...core.record.footprints import Footprint
+from ...core.settings import SceneUnits
+from ..plants import trampling_table
+from ..playback import own_data
+from . import baked_ground, ground_mesh, ground_surface
+
+
+def write(ground: bpy.types.Object, footprints: Sequence[Footprint], units: SceneUnits) -> None:
+    """Write what footprints trample, where plants give way on a ground; elsewhere nothing happens."""
+    trampled = trampling_table.write(ground, footprints, units)
+    if trampled is None:
+        return
+    shown = baked_ground.display_mesh_of(ground)
+    place = ground_surface.rest_vertices(shown, units.unit_scale_m)
+    latest = trampled.latest(place[:, 0], place[:, 1])
+    passes = np.where(latest >= 0, trampled.by.passes[latest], 0.0)
+    ground_mesh.write_shading(shown, own_data.PASSES, np.arange(len(passes)), passes)

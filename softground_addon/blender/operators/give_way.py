@@ -1,0 +1,113 @@
+"""*Give Way*: plants and litter of the user's bend under the soles of the bake, and rise again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...core.errors import InputError
+from ...core.settings import SceneUnits
+from .. import mesh_arrays, settings
+from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
+from ..operator_base import reports_errors
+from ..plants import give_way, meadow, trampling_table
+from ..weather.ground_weather import damage_named
+
+
+class SOFTGROUND_OT_give_way(bpy.types.Operator):
+    """Let the selected plants or litter give way to the feet: hair curves, instances, meshes of loose blades. One
+    modifier behind yours; remove it, and all is as it was"""
+
+    bl_idname = "softground.give_way"
+    bl_label = "Give Way"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(name="Kind", description="What gives way", items=give_way.KINDS, default="MEADOW")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the scene has a ground and the active object may give way: a redraw looks at no other."""
+        cls.poll_message_set("Choose a ground, and select plants or litter on it")
+        ground, active = settings.options_of(context).ground, context.active_object
+        if ground is None or active is None or not active.select_get() or context.mode != "OBJECT":
+            return False
+        return _may_give_way(active, ground)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        ground = settings.options_of(context).ground
+        chosen = [obj for obj in context.selected_objects if _may_give_way(obj, ground)]
+        linked = next((obj for obj in chosen if obj.library), None)
+        if linked is not None:
+            raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
+        _let(ground, chosen, self.kind)
+        self.report({"INFO"}, f"{len(chosen)} objects give way" if len(chosen) > 1 else f"'{chosen[0].name}' gives way")
+        return {"FINISHED"}
+
+
+def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str) -> None:
+    """Let objects give way to the prints of a ground."""
+    ground_checks.check_writable(ground)
+    if trampling_table.of(ground) is None and baked_ground.is_baked(ground):
+        footprints, about = baked_ground.load(ground)
+        with damage_named(ground):
+            units = baked_ground.units_of(about["inputs"])
+        trampling_table.ensure(ground)
+        trampled_ground.write(ground, footprints, SceneUnits(**{name: units[name] for name in _UNITS}))
+    table = trampling_table.ensure(ground)
+    for obj in chosen:
+        give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
+
+
+_UNITS = [field.name for field in fields(SceneUnits)]
+
+
+def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
+    """True of plants and litter; of a ground only with a scatter of its own."""
+    if obj.type not in give_way.SCATTERS:
+        return False
+    is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
+    return not is_ground or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj))
+
+
+class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
+    """Let a meadow of hair curves grow around the prints, or on all of the ground before a bake. It gives way"""
+
+    bl_idname = "softground.add_sample_meadow"
+    bl_label = "Add Sample Meadow"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the scene has a ground."""
+        cls.poll_message_set("Choose or create a ground first")
+        ground = settings.options_of(context).ground
+        return ground is not None and ground.type == "MESH" and context.mode == "OBJECT"
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        unit_scale = settings.units_of(scene).unit_scale_m
+        shown = baked_ground.display_mesh_of(ground)
+        corners = ground_surface.rest_vertices(shown, unit_scale)[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
+        if not len(corners):
+            raise InputError(f"Ground '{ground.name}' has no faces that a meadow could grow on.")
+        steps = baked_ground.load(ground)[0] if baked_ground.is_baked(ground) else []
+        near = np.array([step.position[:2] for step in steps]) if steps else None
+        grass = meadow.grow(corners, unit_scale, near, _REACH)
+        for collection in ground.users_collection:
+            collection.objects.link(grass)
+        _let(ground, [grass], "MEADOW")
+        self.report({"INFO"}, f"Added '{grass.name}'")
+        return {"FINISHED"}
+
+
+_REACH = 1.0
+"""How far around prints the sample meadow grows [m]."""
+
+CLASSES = (SOFTGROUND_OT_give_way, SOFTGROUND_OT_add_sample_meadow)

@@ -1,0 +1,113 @@
+"""*Give Way* on a scatter of the user's: one modifier behind theirs, set to what the scatter is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, cast
+
+import bpy
+import numpy as np
+
+from ...core.plants.bending import PLANTS
+from .. import compat, mesh_arrays
+from ..node_modifiers import inputs_of, named_by_nodes, nodes_of
+from . import give_way_nodes as nodes
+from .trampling_table import modifier_of
+
+MODIFIER = nodes.GROUP
+LITTER = "LITTER"
+KINDS = (
+    *((key, title, f"Plants that bend and rise like {title.lower()}") for key, (title, _) in PLANTS.items()),
+    (LITTER, "Leaves and Pebbles", "What lies on the ground, is pressed in, and tilts with the prints"),
+)
+"""What gives way, as an enum has it."""
+SCATTERS = ("MESH", "CURVES")
+"""Types of objects that give way."""
+_SHAPES = ("MESH", "CURVE", "CURVES", "SURFACE")
+_TALL = 95
+"""Percentile of heights that is taken for that of the scatter: a few that are taller pass for grass that is moved."""
+
+
+def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> Any:
+    """Have an object give way, behind its own modifiers; one that does gets the values of a preset.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    kind : str
+        One of `KINDS`.
+    table : bpy.types.Object
+        From `trampling_table`.
+    grounds : collection of bpy.types.Object
+        The objects that show the prints.
+    """
+    follows, instances = _follows(obj, grounds), _instances_of(obj)
+    height = _height_of(obj, instances)
+    modifier = modifier_of(obj)
+    if modifier is None:
+        modifier = cast("Any", obj.modifiers.new(MODIFIER, "NODES"))
+        modifier.node_group = nodes.ensure_group()
+        modifier.show_in_editmode = False
+    plant = PLANTS.get(kind, PLANTS["MEADOW"])[1]
+    values: Mapping[str, Any] = {
+        "Table": table,
+        "Height": height or plant.height,
+        "Stiffness": plant.stiffness,
+        "Recovery": plant.recovery,
+        "Breaks": plant.breaks,
+        "Half After": plant.half_after,
+        "Stands": kind != LITTER,
+        "Sinks": not follows,
+        "Loose Parts": obj.type == "MESH" and obj not in grounds and not len(instances),
+    }
+    sockets = inputs_of(modifier)
+    for name, value in values.items():
+        compat.write_input(modifier, sockets[name], value)
+    obj.update_tag()
+    return modifier
+
+
+def _follows(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> bool:
+    """True if a scatter goes with the prints by itself, as it is made on what shows them."""
+    if obj in grounds:
+        return True
+    on_surface = getattr(obj.data, "surface", None) in grounds
+    for modifier in obj.modifiers:
+        if modifier.type != "NODES" or modifier.node_group is None:
+            continue
+        named = [*named_by_nodes(modifier), *(value for _, value in compat.node_inputs(modifier))]
+        deforms = any(node.bl_idname == "GeometryNodeDeformCurvesOnSurface" for node in nodes_of(modifier))
+        if any(isinstance(one, bpy.types.Object) and one in grounds for one in named) or (on_surface and deforms):
+            return True
+    return False
+
+
+def _instances_of(obj: bpy.types.Object) -> Any:
+    """Heights of the instances that an object makes, (N,) [Blender units]."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    heights = []
+    for instance in graph.object_instances:
+        if instance.is_instance and instance.parent and instance.parent.original == obj:
+            shape = instance.instance_object
+            top = max((corner[2] for corner in shape.bound_box), default=0.0) if shape.type in _SHAPES else 0.0
+            heights.append(top * instance.matrix_world.to_scale().z)
+    return np.array(heights)
+
+
+def _height_of(obj: bpy.types.Object, instances: Any) -> float:
+    """Height of what an object scatters [Blender units]; 0 where that cannot be told."""
+    if len(instances):
+        return float(np.percentile(instances, _TALL))
+    scale = obj.matrix_world.to_scale().z
+    if obj.type == "MESH":
+        up = mesh_arrays.positions(cast("bpy.types.Mesh", obj.data))[:, 2]
+        return scale * float(np.ptp(up)) if len(up) else 0.0
+    curves: Any = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    if not len(curves.curves):
+        return 0.0
+    height = np.empty(len(curves.points) * 3, np.float32)
+    curves.attributes["position"].data.foreach_get("vector", height)
+    height = height[2::3]
+    first = np.empty(len(curves.curves), np.int32)
+    curves.curves.foreach_get("first_point_index", first)
+    return scale * float(np.percentile(np.maximum.reduceat(height, first) - height[first], _TALL))

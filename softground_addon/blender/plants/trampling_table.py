@@ -1,0 +1,126 @@
+"""The table that plants give way by: an object of vertices in no scene, which each bake of its ground writes anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...core.plants.tramplings import Tramplings, tramplings
+from ...core.record.footprints import Footprint
+from ...core.settings import SceneUnits
+from .. import compat
+from ..drafts import none_left_if_it_fails
+from ..node_modifiers import modifier_with
+from . import give_way_nodes as nodes
+
+NAME = "SoftGround Tramplings"
+TRAMPLED, TRAMPLED_ON = "softground_trampled", "softground_trampled_on"
+"""Properties of the ground, its table, and of the table, its ground."""
+NEVER = 1e9
+"""Frame of passes that never begin."""
+
+
+def of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The table of a ground; none of a ground that is a duplicate."""
+    table = ground.get(TRAMPLED)
+    return table if table is not None and table.get(TRAMPLED_ON) == ground else None
+
+
+def ensure(ground: bpy.types.Object) -> bpy.types.Object:
+    """The table of a ground, empty on first use."""
+    table = of(ground)
+    if table is None:
+        table = bpy.data.objects.new(NAME, bpy.data.meshes.new(NAME))
+        table[TRAMPLED_ON], ground[TRAMPLED] = ground, table
+        table.parent = ground
+    return table
+
+
+def write(ground: bpy.types.Object, footprints: Sequence[Footprint], units: SceneUnits) -> Tramplings | None:
+    """Write what soles trample to a ground's table, if it has one; returns that."""
+    table = of(ground)
+    if table is None:
+        return None
+    trampled = tramplings(footprints)
+    with none_left_if_it_fails():
+        vertices = bpy.data.meshes.new(NAME)
+        if trampled is not None:
+            _fill(vertices, trampled, units)
+    _exchange(table, vertices)
+    if trampled is not None:
+        side = trampled.cell_size / units.unit_scale_m
+        origin = trampled.origin / units.unit_scale_m
+        table.matrix_parent_inverse = ground.matrix_world.inverted()
+        table.matrix_basis = Matrix.Translation((*origin, 0.0)) @ Matrix.Scale(side, 4)
+    return trampled
+
+
+def clear(ground: bpy.types.Object) -> None:
+    """Empty a ground's table, so that plants stand; it goes where no plants are left that give way by it."""
+    table = of(ground)
+    if table is None:
+        return
+    if any(table in _tables_of(obj) for obj in bpy.data.objects):
+        _exchange(table, bpy.data.meshes.new(NAME))
+        return
+    ground.pop(TRAMPLED, None)
+    vertices = cast("bpy.types.Mesh", table.data)
+    bpy.data.objects.remove(table)
+    bpy.data.meshes.remove(vertices)
+
+
+def modifier_of(obj: bpy.types.Object) -> Any:
+    """The modifier by which an object gives way, whatever its name has become; None without one."""
+    return modifier_with(obj, nodes.is_give_way)
+
+
+def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> None:
+    """Store the table in the attributes of vertices, each from the first on; lengths in cells."""
+    stretch, scale, by = units.time_stretch, units.unit_scale_m, trampled.by
+    rows, columns = trampled.tiles.shape
+    x, y = trampled.direction.T
+    size = trampled.cell_size
+    start, end = by.start * stretch, by.end * stretch
+    pace = 1.0 / (scale * stretch)
+    meta = (
+        (columns, trampled.tile, units.frame_rate * stretch),
+        (columns * trampled.tile - 1, rows * trampled.tile - 1, trampled.active.min() * stretch),
+    )
+    sink = np.column_stack([trampled.sink / size, trampled.slope])
+    arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
+        (nodes.META, "FLOAT_VECTOR", np.array(meta)),
+        (nodes.TILES, "INT", trampled.tiles.ravel()),
+        (nodes.FIRST, "INT", trampled.first),
+        (nodes.ACTIVE, "FLOAT", trampled.active * stretch),
+        (nodes.TIMES, "FLOAT_VECTOR", np.column_stack([start, end, by.reach])),
+        (nodes.LEAN, "FLOAT_VECTOR", np.column_stack([np.arctan2(y, x), by.lasting, by.above / scale])),
+        (nodes.PACE, "FLOAT_VECTOR", np.column_stack([by.down * pace, by.up * pace, by.passes])),
+        (nodes.SINK, "FLOAT_VECTOR", sink),
+    )
+    count = max(len(values) for _, _, values in arrays) + 1
+    vertices.vertices.add(count)
+    for name, kind, values in arrays:
+        whole = np.full((count, *values.shape[1:]), NEVER if name == nodes.ACTIVE else 0, values.dtype)
+        whole[: len(values)] = values
+        attribute: Any = vertices.attributes.new(name, cast("Any", kind), "POINT")
+        flat = whole.astype(np.int32 if kind == "INT" else np.float32).ravel()
+        attribute.data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
+
+
+def _exchange(table: bpy.types.Object, vertices: bpy.types.Mesh) -> None:
+    """Give a table other vertices."""
+    old: Any = table.data
+    table.data = vertices
+    if not old.users:
+        bpy.data.meshes.remove(old)
+
+
+def _tables_of(obj: bpy.types.Object) -> list[Any]:
+    """Objects that are inputs of an object's modifier of ours."""
+    modifier = modifier_of(obj)
+    return [value for _, value in compat.node_inputs(modifier)] if modifier else []

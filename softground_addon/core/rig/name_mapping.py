@@ -1,0 +1,116 @@
+"""Roles of bones by the names of the usual rigs; those with the same word are told apart by what hangs on what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+
+import numpy as np
+
+from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
+from .bones import RigBones, above
+from .mapping import BoneEnd, RigMapping, SoleSource
+
+_JOINT_HEADS = {
+    "hip": "thigh",
+    "knee": "shin",
+    "ankle": "foot",
+    "ball": "toe",
+    "shoulder": "upper_arm",
+    "elbow": "forearm",
+    "wrist": "hand",
+}
+"""Joint to the segment whose head it is."""
+
+_HIPS_OF_SOME = ("root", "cog", "spine")
+"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
+
+
+def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
+    """The mapping that the names give, or None where they name no foot.
+
+    Parameters
+    ----------
+    bones : RigBones
+    deforming : set of str
+        Names of those that move a mesh.
+    """
+    names = read_names(bones, deforming)
+    joints: dict[str, BoneEnd] = {}
+    soles = []
+    for side, suffix in (("L", "_l"), ("R", "_r")):
+        limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
+        _settle_ambiguities(limb, names, bones, side, deforming)
+        foot, toe = limb["foot"], limb["toe"]
+        for joint, segment in _JOINT_HEADS.items():
+            if bone := limb[segment]:
+                joints[joint + suffix] = (bone, "head")
+        if "wrist" + suffix not in joints and limb["forearm"]:
+            joints["wrist" + suffix] = (limb["forearm"], "tail")
+        if foot or toe:
+            joints["toe" + suffix] = (toe or foot, "tail")
+            soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
+    if not soles:
+        return None
+    joints.update(_map_trunk(names, bones, joints, deforming))
+    return RigMapping(joints=joints, soles=tuple(soles))
+
+
+def _settle_ambiguities(
+    limb: dict[str, str], names: list[BoneName], bones: RigBones, side: str, deforming: Set[str]
+) -> None:
+    """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
+    knee, leg = (best(names, (word,), side) for word in ("knee", "leg"))
+    if knee and leg and leg in above(bones, knee):
+        limb["shin"] = knee
+        limb["thigh"] = limb["thigh"] if limb["thigh"] and limb["thigh"] in above(bones, leg) else leg
+    ankle, foot = (best(names, (word,), side) for word in ("ankle", "foot"))
+    if ankle and foot and ankle in above(bones, foot):
+        limb["foot"] = ankle
+        limb["toe"] = limb["toe"] if limb["toe"] and foot not in above(bones, limb["toe"]) else foot
+    toe, foot = limb["toe"], limb["foot"]
+    if toe and foot and (toe in above(bones, foot) or (foot in deforming and toe not in deforming)):
+        limb["toe"] = ""
+
+
+def _map_trunk(
+    names: list[BoneName], bones: RigBones, limbs: Mapping[str, BoneEnd], deforming: Set[str]
+) -> dict[str, BoneEnd]:
+    """Hips, spine, neck and head; the hips may also be where the thighs meet."""
+    by_joint = {joint: best(names, words, "") for joint, words in TRUNK.items()}
+    thighs = [limbs[joint][0] for joint in ("hip_l", "hip_r") if joint in limbs]
+    if by_joint["hips"] not in deforming:
+        candidates = [by_joint["hips"], *(best(names, (word,), "") for word in _HIPS_OF_SOME)]
+        candidates.append(_common_ancestor(thighs, bones))
+        by_joint["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones, deforming)
+    top = by_joint["neck"] or by_joint["head"]
+    if by_joint["hips"] and top:
+        chain = [*above(bones, top)]
+        if by_joint["hips"] in chain:
+            words = {name.bone: name.word for name in names}
+            upward = chain[: chain.index(by_joint["hips"])]
+            trunk = [bone for bone in upward if words.get(bone) not in TRUNK["neck"]]
+            by_joint["spine"] = trunk[-1] if trunk else ""
+    if by_joint["spine"] == by_joint["hips"]:
+        spines = sorted(
+            (name.number, name.bone)
+            for name in names
+            if name.word == "spine" and name.deforms and name.bone != by_joint["hips"]
+        )
+        by_joint["spine"] = spines[0][1] if spines else ""
+    return {joint: (bone, "head") for joint, bone in by_joint.items() if bone}
+
+
+def _common_ancestor(names: Sequence[str], bones: RigBones) -> str:
+    """Nearest bone that all of the given ones hang from; empty if there is none."""
+    if not names:
+        return ""
+    chains = [[*above(bones, name)] for name in names]
+    return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")
+
+
+def _nearest_to_thighs(candidates: Sequence[str], thighs: Sequence[str], bones: RigBones, deforming: Set[str]) -> str:
+    """The bone that starts nearest to the middle between the thighs, deforming ones first; empty without candidates."""
+    if not thighs or not candidates:
+        return candidates[0] if candidates else ""
+    middle = np.mean([bones[thigh].head for thigh in thighs], axis=0)
+    return min(candidates, key=lambda name: (name not in deforming, float(np.linalg.norm(bones[name].head - middle))))
