@@ -15,9 +15,6 @@ Array = NDArray[np.float64]
 
 FALL_TIME = 0.06
 """Longest time in which deep ground gives way under a lasting load [s]: as the load grows, a foot falls in about 0.1 s."""
-TILT = 0.55
-"""Share of what the travelling pressure exceeds its mean by that is left under a sole that wades: it tilts it. In settled
-snow, toes sink 2-6 cm deeper than the heel (make validate-ground)."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +42,8 @@ class Plate:
         return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
 
     def level(self, relative: Array) -> None:
-        """Raise a pressure over its mean to 1 where it is less, and lower it where it is more, in place."""
-        further = np.maximum(relative, 1.0) - 1.0
-        relative += self.share * (1.0 + TILT * further - relative)
+        """Raise a pressure over its mean to 1 where it is less, in place."""
+        relative += self.share * (np.maximum(relative, 1.0) - relative)
 
 
 def plate_of(points: SolePoints, depth: float) -> Plate | None:
