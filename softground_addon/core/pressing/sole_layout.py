@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
-from ..ground.variation import layer_factors
+from ..ground.variation import Factors, layer_factors
 from ..imprints.sole_imprint import PatchOverCells, cell_coverage, patches_over_cells
 from ..imprints.sole_points import (
     PointContact,
@@ -68,10 +68,8 @@ class SoleLayout(ContactLayout):
         landing_speed, firmness = self._landing_drop / step, material.firmness(self._width)
         softness = None
         if factors:
-            under = window.cells_under(*places(points, poses), cells.cell_size)
-            softness = factors.softness(material.exponent)[under]
-        depth = target_compression(self.force.max(initial=0.0) / points.area, material, firmness=firmness)
-        plate = plate_of(points, float(depth) * (1.0 if softness is None else float(softness.mean())))
+            softness = self._softness(factors, window, poses, cells)
+        plate = self._plate(cells, firmness)
         sinking = sink(
             over_ground.clearance,
             area,
@@ -126,6 +124,21 @@ class SoleLayout(ContactLayout):
                 self._middle(poses, over_ground, printing),
             ),
         )
+
+    def _plate(self, cells: GroundCells, firmness: float) -> Plate | None:
+        """The plate that the sole is throughout the contact, by the ground under it at its largest load."""
+        heaviest = int(self.force.argmax())
+        depth = float(target_compression(self.force[heaviest] / self.points.area, cells.material, firmness=firmness))
+        window = self._window(self.first + heaviest, self.first + heaviest + 1, cells)
+        if factors := cells.factors(window):
+            depth *= float(self._softness(factors, window, self.steps.poses[heaviest, None], cells).mean())
+        return plate_of(self.points, depth)
+
+    def _softness(self, factors: Factors, window: Window, poses: Array, cells: GroundCells) -> Array:
+        """Compression of the ground under each point of the posed sole per that of the material, (N, Q)."""
+        return factors.softness(cells.material.exponent)[
+            window.cells_under(*places(self.points, poses), cells.cell_size)
+        ]
 
     def _posed(
         self, start: int, end: int, window: Window, cells: UndisturbedCells

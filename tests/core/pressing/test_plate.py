@@ -12,7 +12,9 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
+from softground_addon.core.pressing import contact_layout
 from softground_addon.core.pressing.plate import FALL_TIME, Plate
+from tests.core.ground.test_variation import Bands
 from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, pressed, standing, walk
 
 DEEP = GroundMaterial(110e3, 0.05, 0.2, layer_depth=0.60)
@@ -29,6 +31,7 @@ def switch_off(monkeypatch):
 
 
 def as_bytes(prints):
+    prints = list(prints)
     arrays = [(mark.compression.frames, mark.compression.cells, mark.compression.amounts) for mark in prints]
     arrays += [(mark.rim.amounts, mark.contact_start, mark.contact_end) for mark in prints]
     return [array.tobytes() for group in arrays for array in group]
@@ -58,14 +61,38 @@ def test_above_the_ankle_prints_are_bit_for_bit_those_without_the_law(material, 
     assert as_bytes(prints) == as_bytes(prints_on(material, pressure=pressure))
 
 
-def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law(monkeypatch):
+def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law_and_ends_as_deep(monkeypatch):
     with_law = prints_on(DEEP)
     switch_off(monkeypatch)
     without = prints_on(DEEP)
-    assert max(half_time(mark) for mark in with_law) < 0.35
-    assert min(half_time(mark) for mark in without) > 0.4
     for deep, other in zip(with_law, without, strict=True):
-        assert 0.8 < deep.max_depth_m / other.max_depth_m < 1.05, "the depth of a stiffness stays about the same"
+        assert half_time(deep) < 0.75 * half_time(other)
+        assert deep.max_depth_m == pytest.approx(other.max_depth_m, rel=0.03)
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+def test_a_deep_print_on_painted_ground_does_not_depend_on_how_many_steps_are_laid_out_at_once(pressure, monkeypatch):
+    bands = Bands(right=(1.3, 0.9, 1.0))
+
+    def painted():
+        ground = SoftGround(FlatTerrain(), DEEP, pressure=pressure, variation=bands)
+        return [mark for result in simulate([walk(steps=2)], ground, 0.02) for mark in result.footprints]
+
+    at_once = painted()
+    assert max(mark.max_depth_m for mark in at_once) > deep_ground.WADES * FOOT_LENGTH
+    monkeypatch.setattr(contact_layout, "STEPS_AT_ONCE", 1)
+    assert as_bytes(painted()) == as_bytes(at_once)
+
+
+def test_a_thin_layer_painted_on_deep_ground_is_shallow_ground(monkeypatch):
+    ground = SoftGround(FlatTerrain(), DEEP, pressure="CENTRE_OF_PRESSURE", variation=Bands((1, 0.2, 1), (1, 0.2, 1)))
+
+    def thin():
+        return as_bytes(mark for result in simulate([walk(steps=2)], ground, 0.02) for mark in result.footprints)
+
+    with_law = thin()
+    switch_off(monkeypatch)
+    assert thin() == with_law
 
 
 def test_a_lasting_load_brings_a_sole_down_evenly_in_the_fall_time():
@@ -86,6 +113,14 @@ def test_a_plate_bears_with_what_touches_or_with_all_of_the_sole(share, bearing,
     assert plate.bearing(0.004) == pytest.approx(bearing)
     assert plate.rate(0.05, 0.01) == pytest.approx(rate)
     assert plate.rate(0.5, 0.01) == pytest.approx(0.5), "never slower than the ground"
+
+
+def test_a_plate_takes_no_pressure_away_and_leaves_none_below_the_mean():
+    pressure = np.array([0.0, 0.4, 1.0, 1.6])
+    for share, expected in ((0.5, [0.5, 0.7, 1.0, 1.6]), (1.0, [1.0, 1.0, 1.0, 1.6])):
+        levelled = pressure.copy()
+        Plate(share, 0.02).level(levelled)
+        np.testing.assert_allclose(levelled, expected)
 
 
 def test_wading_goes_by_the_length_of_the_sole_and_grows_smoothly():
