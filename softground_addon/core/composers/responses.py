@@ -245,8 +245,8 @@ def _too_deep(character: CharacterResponse) -> Finding:
     return Finding(
         "deep_for_this_walk",
         "warning",
-        f"'{name}' sinks {depth * 100:.0f} cm deep, {depth / leg:.0%} of its legs: a walk made for firm ground does not "
-        "become wading by being lowered so far, and its knees stay bent.",
+        f"'{name}' sinks {depth * 100:.0f} cm deep, {depth / leg:.0%} of its legs: a walk made for firm ground does "
+        "not become wading by being lowered so far, and its knees stay bent.",
         "Choose a firmer or shallower ground, or an animation of somebody who wades.",
     )
 

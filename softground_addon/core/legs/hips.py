@@ -53,9 +53,7 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
     return height + share * (risen - depth - height) if share.any() else height
 
 
-def wading_depth(
-    motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask
-) -> tuple[Array, Array]:
+def wading_depth(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> tuple[Array, Array]:
     """Depth (F,) in which a body wades [m], and how much it wades (F,), 0 to 1; see `hips_follow`."""
     depths = {sole: depth_of_contacts(placed.sinkage, touching[:, sole]) for sole, placed in placements.items()}
     depth = body_depth(depths, DEPTH_TIME * motion.adult_second)

@@ -27,7 +27,7 @@ _FRAME = 1 / 30
 KNEE_PACE = np.radians(13.0) / _FRAME
 """Largest speed of a knee [rad/s], for an adult, or that of the source where it is larger."""
 WADING_PACE = 2.0
-"""How many times faster the knees of a body may turn that wades: a foot falls into deep ground and is pulled out of it."""
+"""How many times faster knees may turn in deep ground: a foot falls into it and is pulled out of it."""
 SOURCE_WINDOW = 0.05
 """Time around an instant in which the source's own pace counts [s], for an adult."""
 NEARLY_STRAIGHT = np.radians(8.0)
@@ -261,7 +261,7 @@ def _cost(equations: Sequence[_Equations]) -> float:
 
 
 def _allowed_turn(leg: PacedLeg, pace: Array, step: float, time_scale: float) -> Array:
-    """Largest turn of a knee from each sample to the next, (F - 1,) [rad], at a pace (F - 1,) [rad/s] or the source's."""
+    """Largest turn of a knee from each sample to the next, (F - 1,) [rad], at a pace [rad/s] or the source's."""
     source = np.abs(np.diff(leg.source.flexion))
     reach = max(1, round(SOURCE_WINDOW * time_scale / step))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(source, reach, mode="edge"), 2 * reach + 1).max(axis=1)

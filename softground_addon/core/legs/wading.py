@@ -18,8 +18,8 @@ Mask = NDArray[np.bool_]
 DEPTH_TIME = 0.4
 """Standard deviation of the smoothing of the sinkage that the body responds to [s], for an adult."""
 PLOUGH = 0.65
-"""Most that a swinging foot ploughs through the top of a deep layer, in sole lengths: 10 cm of 20 for an adult, 15 of 50
-(tried on the sample walk: people plough where they can and lift over the rest)."""
+"""Most that a swinging foot ploughs through the top of a deep layer, in sole lengths: an adult ploughs 9 cm deep of 20,
+15 of 50 (tried on the sample walk: people plough where they can and lift over the rest)."""
 
 
 def depth_of_contacts(sinkage: Array, touching: Mask) -> Array:
@@ -37,7 +37,7 @@ def body_depth(depths: Mapping[Any, Array], width: float) -> Array:
 
 
 def ploughed(depth: Any, sole_length: float) -> Any:
-    """How deep below the surface a foot swings [m] that sinks so deep: less of a deeper layer, nothing of a shallow one.
+    """Depth below the surface at which a foot swings [m]: a lesser part of a deeper layer, 0 in a shallow one.
 
     Parameters
     ----------

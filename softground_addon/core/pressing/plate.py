@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ..ground.deep_ground import wading
 from ..imprints.sole_points import SolePoints
 
-Array = NDArray[np.float64]
+Pressure = NDArray[np.floating[Any]]
 
 FALL_TIME = 0.06
-"""Longest time in which deep ground gives way under a lasting load [s]: as the load grows, a foot falls in about 0.1 s."""
+"""Longest time in which deep ground gives way under a lasting load [s]: a foot falls in about 0.1 s as it is loaded."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Plate:
         time = step / rate
         return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
 
-    def level(self, relative: Array) -> None:
+    def level(self, relative: Pressure) -> None:
         """Raise a pressure over its mean to 1 where it is less, in place."""
         relative += self.share * (np.maximum(relative, 1.0) - relative)
 

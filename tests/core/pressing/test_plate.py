@@ -81,7 +81,8 @@ def test_a_deep_print_on_painted_ground_does_not_depend_on_how_many_steps_are_la
     at_once = painted()
     assert max(mark.max_depth_m for mark in at_once) > deep_ground.WADES * FOOT_LENGTH
     monkeypatch.setattr(contact_layout, "STEPS_AT_ONCE", 1)
-    assert as_bytes(painted()) == as_bytes(at_once)
+    for mark, other in zip(painted(), at_once, strict=True):
+        np.testing.assert_allclose(mark.tile(mark.compression), other.tile(other.compression), atol=1e-6)
 
 
 def test_a_thin_layer_painted_on_deep_ground_is_shallow_ground(monkeypatch):

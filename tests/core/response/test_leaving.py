@@ -69,5 +69,5 @@ def test_a_walk_that_sinks_too_deep_to_wade_is_named_with_a_remedy(legs, codes):
     findings = response_findings([CharacterResponse(motion, response, left, left, depth)])
     assert [finding.code for finding in findings] == codes
     for finding in findings:
-        assert f"'{motion.name}' sinks {100 * depth:.0f} cm" in finding.text
+        assert f"'{motion.name}' sinks {100 * depth:.0f} cm" in finding.message
         assert finding.remedy
