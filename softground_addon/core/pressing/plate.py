@@ -47,6 +47,6 @@ class Plate:
 
 
 def plate_of(points: SolePoints, depth: float) -> Plate | None:
-    """The plate that a sole is if its largest load presses all of it so deep [m]; None down to the ankle."""
+    """The plate that a sole is if its load, spread over all of it, presses it so deep [m]; None down to the ankle."""
     share = float(wading(depth, points.length))
     return Plate(share, points.area) if share else None

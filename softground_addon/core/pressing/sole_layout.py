@@ -69,7 +69,7 @@ class SoleLayout(ContactLayout):
         softness = None
         if factors:
             softness = self._softness(factors, window, poses, cells)
-        plate = self._plate(cells, firmness)
+        plate = self._plate(cells, step, landing_speed)
         sinking = sink(
             over_ground.clearance,
             area,
@@ -125,10 +125,13 @@ class SoleLayout(ContactLayout):
             ),
         )
 
-    def _plate(self, cells: GroundCells, firmness: float) -> Plate | None:
-        """The plate that the sole is throughout the contact, by the ground under it at its largest load."""
-        heaviest = int(self.force.argmax())
-        depth = float(target_compression(self.force[heaviest] / self.points.area, cells.material, firmness=firmness))
+    def _plate(self, cells: GroundCells, step: float, landing_speed: float) -> Plate | None:
+        """The plate that the sole is throughout the contact, if even pressure would press it so deep."""
+        material, heaviest = cells.material, int(self.force.argmax())
+        firmness = material.firmness(self._width)
+        target = target_compression(self.force / self.points.area, material, firmness=firmness)
+        rate = compression_rate(step, material, target, landing_speed)
+        depth = min(float(target[heaviest]), float((rate * target).sum()))
         window = self._window(self.first + heaviest, self.first + heaviest + 1, cells)
         if factors := cells.factors(window):
             depth *= float(self._softness(factors, window, self.steps.poses[heaviest, None], cells).mean())

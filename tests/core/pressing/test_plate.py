@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.composers.simulation import simulate
-from softground_addon.core.ground import deep_ground
+from softground_addon.core.ground import deep_ground, presets
 from softground_addon.core.ground.deep_ground import wading
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
@@ -61,10 +61,11 @@ def test_above_the_ankle_prints_are_bit_for_bit_those_without_the_law(material, 
     assert as_bytes(prints) == as_bytes(prints_on(material, pressure=pressure))
 
 
-def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law_and_ends_as_deep(monkeypatch):
-    with_law = prints_on(DEEP)
+@pytest.mark.parametrize("material", [DEEP, presets.find("settled_snow").material, presets.find("powder").material])
+def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law_and_ends_as_deep(material, monkeypatch):
+    with_law = prints_on(material)
     switch_off(monkeypatch)
-    without = prints_on(DEEP)
+    without = prints_on(material)
     for deep, other in zip(with_law, without, strict=True):
         assert half_time(deep) < 0.75 * half_time(other)
         assert deep.max_depth_m == pytest.approx(other.max_depth_m, rel=0.03)
