@@ -15,11 +15,14 @@ Pressure = NDArray[np.floating[Any]]
 
 FALL_TIME = 0.06
 """Longest time in which deep ground gives way under a lasting load [s]: a foot falls in about 0.1 s as it is loaded."""
+STIFF = 0.7
+"""Least pressure under a sole that wades, over its highest: soles are stiff, heel and toes sink nearly together. Tried
+on the sample walk at 20, 35 and 50 cm, so that standing knees straighten."""
 
 
 @dataclass(frozen=True)
 class Plate:
-    """A sole that bears with all of its area at once: what bears less than the mean goes down with the rest.
+    """A sole that bears with all of its area at once: what bears less goes down with the rest.
 
     Attributes
     ----------
@@ -42,8 +45,9 @@ class Plate:
         return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
 
     def level(self, relative: Pressure) -> None:
-        """Raise a pressure over its mean to 1 where it is less, in place."""
-        relative += self.share * (np.maximum(relative, 1.0) - relative)
+        """Raise a pressure over its mean (N, rows, columns), in place: to 1 and to `STIFF` of its highest."""
+        least = np.maximum(1.0, STIFF * relative.max(axis=(-2, -1), keepdims=True))
+        relative += self.share * (np.maximum(relative, least) - relative)
 
 
 def plate_of(points: SolePoints, depth: float) -> Plate | None:

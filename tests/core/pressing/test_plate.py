@@ -13,7 +13,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.pressing import contact_layout
-from softground_addon.core.pressing.plate import FALL_TIME, Plate
+from softground_addon.core.pressing.plate import FALL_TIME, STIFF, Plate
 from tests.core.ground.test_variation import Bands
 from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, pressed, standing, walk
 
@@ -117,12 +117,15 @@ def test_a_plate_bears_with_what_touches_or_with_all_of_the_sole(share, bearing,
     assert plate.rate(0.5, 0.01) == pytest.approx(0.5), "never slower than the ground"
 
 
-def test_a_plate_takes_no_pressure_away_and_leaves_none_below_the_mean():
-    pressure = np.array([0.0, 0.4, 1.0, 1.6])
-    for share, expected in ((0.5, [0.5, 0.7, 1.0, 1.6]), (1.0, [1.0, 1.0, 1.0, 1.6])):
-        levelled = pressure.copy()
-        Plate(share, 0.02).level(levelled)
-        np.testing.assert_allclose(levelled, expected)
+def test_a_plate_takes_no_pressure_away_and_leaves_none_far_below_the_highest():
+    even, tilted = [0.9, 1.0, 1.0, 1.1], [0.0, 0.9, 1.5, 1.6]
+    for share, expected in (
+        (1.0, [[1.0, 1.0, 1.0, 1.1], [1.6 * STIFF, 1.6 * STIFF, 1.5, 1.6]]),
+        (0.5, [[0.95, 1.0, 1.0, 1.1], [0.8 * STIFF, 0.45 + 0.8 * STIFF, 1.5, 1.6]]),
+    ):
+        pressure = np.array([even, tilted])[:, None]
+        Plate(share, 0.02).level(pressure)
+        np.testing.assert_allclose(pressure[:, 0], expected)
 
 
 def test_wading_goes_by_the_length_of_the_sole_and_grows_smoothly():
