@@ -159,6 +159,7 @@ gui: $(READY) blenders
 	$(GUI) -m "gui and not alone" $(SIDE_BY_SIDE) --dist loadfile --no-loadscope-reorder
 
 # The pictures in the docs, as the GUI tests took them in Blender 4.3.
+pictures: export PICTURES_OF_DOCS := 1
 pictures: gui
 	cp build/gui/trixie/*/docs/*.png docs/images/
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._core.checks.volumes import check_volumes
 from ._core.composers.simulation import simulate
 from ._core.errors import InputError
-from ._core.ground import hand_hardness
+from ._core.ground import field_tests
 from ._core.ground import presets as presets_of_core
 from ._core.ground.heightfield import FlatTerrain, Terrain
 from ._core.ground.material import GroundMaterial, Pressure
@@ -167,7 +167,7 @@ def snow(hardness: float | str, layer_depth: float | None = None) -> GroundMater
         hardness = HARDNESSES[name]
     if not 1.0 <= hardness <= 5.0 or (layer_depth is not None and not layer_depth > 0):
         raise InputError("the hardness of snow is a number from 1 (fist) to 5 (knife), and its depth is positive")
-    return hand_hardness.snow(hardness, layer_depth)
+    return field_tests.snow(hardness, layer_depth)
 
 
 def presets() -> dict[str, GroundMaterial]:

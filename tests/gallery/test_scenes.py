@@ -11,10 +11,17 @@ from sample_scenes.make_all import SCENES
 from tests.scenes import promises
 
 ROOT = Path(__file__).parents[2]
+LONG = ("tyre_and_boot",)
+"""Scenes that bake for minutes."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["relief", *HEROES])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.marathon if name in LONG else pytest.mark.slow)
+        for name in ("relief", *HEROES)
+    ],
+)
 def test_the_scene_keeps_what_its_picture_promises(addon, scene, name):
     module = import_module(f"gallery.{name}")
     promises.keeps_its_claims(module, scene, module.CELL_SIZE)

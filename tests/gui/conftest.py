@@ -32,6 +32,11 @@ STORY_SECONDS = 1200
 """Longest story on a machine that does other things too; a quiet one takes a minute or two."""
 
 WINDOWS = {
+    "at_rest": (640, 480),
+    "edit_steps": (1100, 760),
+    "held_windows": (1100, 760),
+    "interrupted_bake": (1100, 760),
+    "undo_and_redo": (1100, 760),
     "pauses": (640, 480),
     "buttons": (1100, 760),
     "live_answers": (1100, 760),

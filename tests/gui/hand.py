@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -38,6 +39,8 @@ class Hand:
 
     def __init__(self, pictures: Path) -> None:
         self.pictures = pictures
+        self.for_docs = "PICTURES_OF_DOCS" in os.environ
+        """Pictures of materials in light, which take minutes without a graphics card, are wanted too."""
         self.place = (0, 0)
 
     @property

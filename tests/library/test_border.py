@@ -19,7 +19,7 @@ from library.softground import storage
 from library.softground.cli import main
 from library.softground.plates import free_moment
 from softground_addon.core.capture.joint_centres import UPWARD
-from softground_addon.core.ground.hand_hardness import snow as snow_of_core
+from softground_addon.core.ground.field_tests import snow as snow_of_core
 from softground_addon.core.ground.heightfield import SlopingTerrain
 from softground_addon.core.loads import estimate
 from tests.core.capture.c3d_files import c3d_file

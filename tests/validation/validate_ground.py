@@ -26,7 +26,7 @@ from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from softground_addon.core.ground import presets
-from softground_addon.core.ground.hand_hardness import DENSITY, PACKED_DENSITY, plates, snow
+from softground_addon.core.ground.field_tests import DENSITY, PACKED_DENSITY, plates, snow
 from softground_addon.core.ground.material import STANDARD_GRAVITY, GroundMaterial
 from softground_addon.core.imprints.indentation import stress
 from softground_addon.core.record.footprints import Footprint

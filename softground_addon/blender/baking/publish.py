@@ -16,6 +16,7 @@ from ...core.debris.thrown_debris import thrown
 from ...core.ground.soft_ground import SoftGround
 from ...core.loads.estimate import CharacterLoads
 from ...core.numerics.slices import Slices, sliced
+from ...core.plants.tramplings import Tramplings, tramplings
 from ...core.playback.playback_curves import playback_curves_at
 from ...core.record import record
 from ...core.record.footprints import Footprint
@@ -28,6 +29,7 @@ from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, trampled_ground
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
+from ..plants import trampling_table
 from ..playback import display_key, playback
 from ..reading import staleness
 
@@ -109,7 +111,8 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         del lines, points  # they are large, and all is in the table
         yield Progress("write", 0.8)
         marks = _tread(footprints, place.position, made_with, relief)
-        yield Progress("write", 0.9)
+        yield Progress("write", 0.85)
+        trampled = yield from _trampled(footprints, made_with)
         yield from baked_ground.write(
             place,
             sample,
@@ -139,8 +142,15 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
-    trampled_ground.write(ground, footprints, made_with)
+    trampled_ground.write(ground, trampled, made_with)
     return Published(ground, shown, error)
+
+
+def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:
+    """What soles trample, where plants give way to it."""
+    if made_with.ground is None or trampling_table.of(settings.found(made_with.ground)) is None:
+        return None
+    return (yield from meanwhile(Progress("write", 0.9), tramplings.slices(footprints)))
 
 
 def sign(

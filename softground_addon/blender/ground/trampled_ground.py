@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import bpy
 import numpy as np
 
-from ...core.record.footprints import Footprint
+from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
 from ..plants import trampling_table
 from ..playback import own_data
 from . import baked_ground, ground_mesh, ground_surface
 
 
-def write(ground: bpy.types.Object, footprints: Sequence[Footprint], units: SceneUnits) -> None:
-    """Write what footprints trample, where plants give way on a ground; elsewhere nothing happens."""
-    trampled = trampling_table.write(ground, footprints, units)
+def write(ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
+    """Write what soles trample, where plants give way on a ground; elsewhere nothing happens."""
+    table = trampling_table.of(ground)
+    if table is None:
+        return
+    trampling_table.write(table, ground, trampled, units)
     if trampled is None:
         return
     shown = baked_ground.display_mesh_of(ground)

@@ -10,6 +10,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core.errors import InputError
+from ...core.plants.tramplings import tramplings
 from ...core.settings import SceneUnits
 from .. import mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
@@ -57,7 +58,8 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
         with damage_named(ground):
             units = baked_ground.units_of(about["inputs"])
         trampling_table.ensure(ground)
-        trampled_ground.write(ground, footprints, SceneUnits(**{name: units[name] for name in _UNITS}))
+        scene_units = SceneUnits(**{name: units[name] for name in _UNITS})
+        trampled_ground.write(ground, tramplings(footprints), scene_units)
     table = trampling_table.ensure(ground)
     for obj in chosen:
         give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})

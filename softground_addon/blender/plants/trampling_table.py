@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, cast
 
 import bpy
@@ -10,8 +9,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core.plants.tramplings import Tramplings, tramplings
-from ...core.record.footprints import Footprint
+from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
 from .. import compat
 from ..drafts import none_left_if_it_fails
@@ -41,12 +39,8 @@ def ensure(ground: bpy.types.Object) -> bpy.types.Object:
     return table
 
 
-def write(ground: bpy.types.Object, footprints: Sequence[Footprint], units: SceneUnits) -> Tramplings | None:
-    """Write what soles trample to a ground's table, if it has one; returns that."""
-    table = of(ground)
-    if table is None:
-        return None
-    trampled = tramplings(footprints)
+def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
+    """Write what soles trample to a ground's table."""
     with none_left_if_it_fails():
         vertices = bpy.data.meshes.new(NAME)
         if trampled is not None:
@@ -57,7 +51,6 @@ def write(ground: bpy.types.Object, footprints: Sequence[Footprint], units: Scen
         origin = trampled.origin / units.unit_scale_m
         table.matrix_parent_inverse = ground.matrix_world.inverted()
         table.matrix_basis = Matrix.Translation((*origin, 0.0)) @ Matrix.Scale(side, 4)
-    return trampled
 
 
 def clear(ground: bpy.types.Object) -> None:

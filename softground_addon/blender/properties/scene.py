@@ -15,7 +15,7 @@ from bpy.props import (
     PointerProperty,
 )
 
-from ...core.ground import hand_hardness
+from ...core.ground import field_tests
 from ..state import state
 from .character import SoftGroundCharacter
 from .fields import in_unit, is_mesh
@@ -182,10 +182,10 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "Hand Hardness",
         "What you can just push into the snow with your hand: 1 a fist, 2 four fingers, 3 one finger, 4 a pencil, 5 a "
         "knife. Sets how stiff and how deep the snow is, as boots sank in 19,811 snow pits",
-        hand_hardness.hardness_of,
-        hand_hardness.hardened,
-        min=hand_hardness.FIST,
-        max=hand_hardness.KNIFE,
+        field_tests.hardness_of,
+        field_tests.hardened,
+        min=field_tests.FIST,
+        max=field_tests.KNIFE,
         step=33,
         precision=2,
     )
@@ -193,8 +193,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "Moisture",
         "How wet the sand is: 0 dry, 0.3 damp, 0.6 wet and firm, 1 soaked. Dry and soaked sand are soft, what is "
         "between is firm. Sets the stiffness",
-        hand_hardness.moisture_of,
-        hand_hardness.moistened,
+        field_tests.moisture_of,
+        field_tests.moistened,
         min=0.0,
         max=1.0,
         step=10,
@@ -203,8 +203,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     soil_moisture: by_feel(
         "Moisture",
         "How wet the soil is: 0 dry and firm, 0.25 moist, 0.5 stiff mud, 0.75 soft mud, 1 liquid. Sets the stiffness",
-        hand_hardness.wetness_of,
-        hand_hardness.wetted,
+        field_tests.wetness_of,
+        field_tests.wetted,
         min=0.0,
         max=1.0,
         step=10,

@@ -14,7 +14,7 @@ from typing import cast, get_args
 
 from ..errors import InputError
 from . import surfaces
-from .hand_hardness import boot_depth
+from .field_tests import boot_depth
 from .material import MATERIAL_RANGES, GroundMaterial, Pressure
 
 FOLDER = Path(__file__).parents[2] / "presets"

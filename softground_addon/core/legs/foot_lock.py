@@ -138,7 +138,7 @@ def eased(middle: Array, turn: Array, move: Array, touching: Mask) -> Array:
     if not touching.any():
         return np.broadcast_to(np.eye(4), (len(touching), 4, 4))
     turn = between_contacts(turn, touching)
-    move = np.stack([between_contacts(move[:, i], touching) for i in range(2)], axis=-1)
+    move = between_contacts(move, touching)
     start = np.concatenate([middle, np.zeros((len(middle), 1))], axis=1)
     end = np.concatenate([middle + move, np.zeros((len(middle), 1))], axis=1)
     return displacement(rotation(turn[:, None] * (0.0, 0.0, 1.0)), start, end)

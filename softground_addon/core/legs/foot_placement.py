@@ -223,7 +223,7 @@ def slide_offset(points: Array, touching: Mask) -> Array:
     for first, end in zip(*runs(touching), strict=True):
         slid = np.cumsum(np.concatenate([np.zeros((1, 3)), step[first + 1 : end]]), axis=0)
         offset[first:end] = slid[len(slid) // 2] - slid
-    return np.stack([between_contacts(offset[:, i], touching) for i in range(3)], axis=-1)
+    return between_contacts(offset, touching)
 
 
 def _alignment(
@@ -272,7 +272,7 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
 
 
 def between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> Array:
-    """Values (F,) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
+    """Values (F,) or (F, N) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
 
     With `upward`, a value that falls at the end of a contact or will rise after the start of one does not go on so
     between them: a foot leaves its print upward and comes down on the next.
@@ -283,11 +283,11 @@ def between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> 
     result[ends[-1] :] = values[ends[-1] - 1]
     for last, first in zip(ends[:-1] - 1, starts[1:], strict=True):
         gap = first - last
-        u = np.arange(1, gap) / gap
+        u = (np.arange(1, gap) / gap).reshape(-1, *[1] * (values.ndim - 1))
         a, b = values[last], values[first]
         before = (a - values[last - 1]) * gap if last > 0 and touching[last - 1] else 0.0
         after = (values[first + 1] - b) * gap if first + 1 < len(values) and touching[first + 1] else 0.0
-        steepest = 1.5 * max(abs(b - a), 1e-3)
+        steepest = 1.5 * np.maximum(np.abs(b - a), 1e-3)
         before = np.clip(before, 0.0 if upward else -steepest, steepest)
         after = np.clip(after, -steepest, 0.0 if upward else steepest)
         result[last + 1 : first] = a + u * (

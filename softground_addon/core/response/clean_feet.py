@@ -155,9 +155,7 @@ def _eased(touching: Mask, middle: Array, *carries: Array) -> Array:
     them."""
     turns = np.mean([rotation_vectors(carry[:, :3, :3]) for carry in carries], axis=0)
     moves = np.mean([carried(carry, middle) - middle for carry in carries], axis=0)
-    turns, moves = (
-        np.stack([between_contacts(each[:, i], touching) for i in range(3)], axis=-1) for each in (turns, moves)
-    )
+    turns, moves = between_contacts(turns, touching), between_contacts(moves, touching)
     return displacement(rotation(turns), middle, middle + moves)
 
 

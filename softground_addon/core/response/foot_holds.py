@@ -115,7 +115,7 @@ class HeldContacts:
                 turn[during] = rotation_vectors(sole.transforms[at, 0, :3, :3] @ np.swapaxes(axes, -1, -2))
         if not turn.any():
             return np.broadcast_to(np.eye(4), (len(frames), 4, 4))
-        turn = np.stack([between_contacts(turn[:, i], held) for i in range(3)], axis=-1)
+        turn = between_contacts(turn, held)
         return displacement(rotation(turn), middle, middle)
 
     def bearing(self, under: Underside, sole: SoleMotion) -> Array:

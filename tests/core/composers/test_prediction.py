@@ -15,7 +15,7 @@ from softground_addon.core.composers.prediction import (
 )
 from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.hand_hardness import plates, snow
+from softground_addon.core.ground.field_tests import plates, snow
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround

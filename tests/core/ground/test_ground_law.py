@@ -9,8 +9,7 @@ from scipy.integrate import quad
 
 from softground_addon.core.checks.volumes import check_volumes
 from softground_addon.core.composers.simulation import simulate
-from softground_addon.core.ground.ground_law import load_at, strain
-from softground_addon.core.ground.hand_hardness import (
+from softground_addon.core.ground.field_tests import (
     boot_depth,
     hardened,
     hardness_of,
@@ -21,6 +20,7 @@ from softground_addon.core.ground.hand_hardness import (
     wetness_of,
     wetted,
 )
+from softground_addon.core.ground.ground_law import load_at, strain
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.presets import find

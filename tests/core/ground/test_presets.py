@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
-from softground_addon.core.ground.hand_hardness import boot_depth
+from softground_addon.core.ground.field_tests import boot_depth
 from softground_addon.core.ground.material import GroundMaterial
 
 SHIPPED = sorted(presets.FOLDER.glob("*.json"))

@@ -11,7 +11,9 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.plants import bending
 from softground_addon.core.plants.bending import PLANTS, Pass, Plant, bend, cover, held, lasting_of
-from softground_addon.core.plants.tramplings import BESIDE, SWING, tramplings
+from softground_addon.core.plants.sole_passes import BESIDE
+from softground_addon.core.plants.swings import SWING_HEIGHT
+from softground_addon.core.plants.tramplings import tramplings
 from softground_addon.core.record.footprints import recompose
 from tests.core.walkers import walk
 
@@ -64,7 +66,7 @@ def test_stiff_plants_spring_back_and_what_brushes_them_leaves_less():
     after = TREAD.end + 100
     stiff = angle(TREAD, replace(GRASS, stiffness=0.5), after)
     assert stiff == pytest.approx(0.5 * angle(TREAD, GRASS, after))
-    brushed = angle(replace(TREAD, above=SWING, passes=0.0), GRASS, after)
+    brushed = angle(replace(TREAD, above=SWING_HEIGHT, passes=0.0), GRASS, after)
     assert brushed == pytest.approx(bending.BRUSHED * angle(TREAD, GRASS, after))
 
 

@@ -37,7 +37,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from add(hand)
     yield from hand.wait_for(lambda: not session().is_baking, 60)
     facts["characters"] = [character.name for character in scene().softground.characters]
-    scene().softground.sink_feet = False  # its layer would take the action that is edited below
+    scene().softground.sink_feet = False
     facts["running"] = {}
 
     def look(after: str) -> Steps:

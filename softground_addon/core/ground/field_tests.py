@@ -1,4 +1,4 @@
-"""Ground from what people know of it: snow by the hand test, sand and soil by their moisture, soil by plates too."""
+"""Ground from tests in the field: snow by the hand test, sand and soil by their moisture, soil by plates too."""
 
 from __future__ import annotations
 
