@@ -162,6 +162,8 @@ def sink(
             if softness is not None:
                 fresh *= float(touching @ (area[k] * softness[k])) / touching_area
             target[k] = packed(fresh, material, layer)
+            if plate:
+                target[k] = plate.depth(target[k])
             if follows_landing:
                 rate = compression_rate(step, material, target[k], landing_speed)
                 rate = plate.rate(rate, step) if plate else rate

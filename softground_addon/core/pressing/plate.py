@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..ground.deep_ground import wading
 from ..imprints.sole_points import SolePoints
 
+Array = NDArray[np.float64]
 Pressure = NDArray[np.floating[Any]]
 
 FALL_TIME = 0.06
@@ -30,10 +31,13 @@ class Plate:
         From 0, as on shallow ground, to 1; see `deep_ground.wading`.
     area : float
         Of the whole sole [m²].
+    reach : float
+        Depth over that of its largest load, lasting, to which the load gets in its time without a plate; 1 for walkers.
     """
 
     share: float
     area: float
+    reach: float = 1.0
 
     def bearing(self, touching: float) -> float:
         """Area that bears the force [m²], while so much of it touches."""
@@ -44,13 +48,29 @@ class Plate:
         time = step / rate
         return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
 
+    def depth(self, target: Any) -> Any:
+        """Compression that a stress leads to, from that which it would lead to if it lasted [m]."""
+        return target * (1.0 - self.share * (1.0 - self.reach))
+
     def level(self, relative: Pressure) -> None:
         """Raise a pressure over its mean (N, rows, columns), in place: to 1 and to `STIFF` of its highest."""
         least = np.maximum(1.0, STIFF * relative.max(axis=(-2, -1), keepdims=True))
         relative += self.share * (np.maximum(relative, least) - relative)
 
 
-def plate_of(points: SolePoints, depth: float) -> Plate | None:
-    """The plate that a sole is if its load, spread over all of it, presses it so deep [m]; None down to the ankle."""
-    share = float(wading(depth, points.length))
-    return Plate(share, points.area) if share else None
+def plate_of(points: SolePoints, target: Array, rate: Any, softness: float) -> Plate | None:
+    """The plate that a sole is under its load; None if that presses it no deeper than the ankle.
+
+    Parameters
+    ----------
+    points : SolePoints
+    target : (N,) float array
+        Compression that the load at each step, spread over the whole sole, leads to [m].
+    rate : float or (N,) float array
+        From `deformation.compression_rate`, without a plate.
+    softness : float
+        Compression of the ground under the sole per that of the material.
+    """
+    reached = float(np.minimum(np.cumsum(rate * target), target).max())
+    share = float(wading(reached * softness, points.length))
+    return Plate(share, points.area, reached / float(target.max())) if share else None

@@ -105,6 +105,7 @@ class SoleLayout(ContactLayout):
         target = sinking.target
         if stress.ndim > 1:
             target = target_compression(stress, material, firmness=firmness, **layer_factors(factors))
+            target = plate.depth(target) if plate else target
         return Imprints(
             start,
             1,
@@ -131,11 +132,11 @@ class SoleLayout(ContactLayout):
         firmness = material.firmness(self._width)
         target = target_compression(self.force / self.points.area, material, firmness=firmness)
         rate = compression_rate(step, material, target, landing_speed)
-        depth = min(float(target[heaviest]), float((rate * target).sum()))
+        softness = 1.0
         window = self._window(self.first + heaviest, self.first + heaviest + 1, cells)
         if factors := cells.factors(window):
-            depth *= float(self._softness(factors, window, self.steps.poses[heaviest, None], cells).mean())
-        return plate_of(self.points, depth)
+            softness = float(self._softness(factors, window, self.steps.poses[heaviest, None], cells).mean())
+        return plate_of(self.points, target, rate, softness)
 
     def _softness(self, factors: Factors, window: Window, poses: Array, cells: GroundCells) -> Array:
         """Compression of the ground under each point of the posed sole per that of the material, (N, Q)."""

@@ -15,7 +15,7 @@ from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.pressing import contact_layout
 from softground_addon.core.pressing.plate import FALL_TIME, STIFF, Plate
 from tests.core.ground.test_variation import Bands
-from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, pressed, standing, walk
+from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk
 
 DEEP = GroundMaterial(110e3, 0.05, 0.2, layer_depth=0.60)
 
@@ -69,6 +69,20 @@ def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law_and_ends_
     for deep, other in zip(with_law, without, strict=True):
         assert half_time(deep) < 0.75 * half_time(other)
         assert deep.max_depth_m == pytest.approx(other.max_depth_m, rel=0.03)
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.3, 0.6])
+def test_a_load_too_short_for_the_ground_presses_no_deeper_than_without_the_law(seconds, monkeypatch):
+    time = np.arange(401) / 600
+    force = np.where(time < seconds, 1800.0 * np.sin(np.pi * time / seconds), 0.0)[:, None]
+    poses = np.tile(pose(np.zeros(3)), (len(time), 1, 1, 1))
+    step = loads_of([box_sole(0.27, 0.1)], [poses], force, force > 0, 120.0)
+    (with_law,) = prints_on(DEEP, step)
+    switch_off(monkeypatch)
+    (without,) = prints_on(DEEP, step)
+    assert with_law.max_depth_m > deep_ground.WADES * FOOT_LENGTH
+    assert with_law.max_depth_m == pytest.approx(without.max_depth_m, rel=0.01)
+    assert half_time(with_law) <= half_time(without)
 
 
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
