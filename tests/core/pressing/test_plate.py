@@ -73,15 +73,15 @@ def test_in_deep_ground_a_step_is_pressed_earlier_than_without_the_law_and_ends_
 
 @pytest.mark.parametrize("seconds", [0.15, 0.3, 0.6])
 def test_a_load_too_short_for_the_ground_presses_no_deeper_than_without_the_law(seconds, monkeypatch):
-    time = np.arange(401) / 600
+    time = np.arange(121) / 120.0
     force = np.where(time < seconds, 1800.0 * np.sin(np.pi * time / seconds), 0.0)[:, None]
     poses = np.tile(pose(np.zeros(3)), (len(time), 1, 1, 1))
     step = loads_of([box_sole(0.27, 0.1)], [poses], force, force > 0, 120.0)
     (with_law,) = prints_on(DEEP, step)
+    assert with_law.max_depth_m > deep_ground.WADES * FOOT_LENGTH
     switch_off(monkeypatch)
     (without,) = prints_on(DEEP, step)
-    assert with_law.max_depth_m > deep_ground.WADES * FOOT_LENGTH
-    assert with_law.max_depth_m == pytest.approx(without.max_depth_m, rel=0.01)
+    assert with_law.max_depth_m == pytest.approx(without.max_depth_m, rel=0.02)
     assert half_time(with_law) <= half_time(without)
 
 
