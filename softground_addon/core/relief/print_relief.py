@@ -189,10 +189,9 @@ class PrintRelief:
         size = chunks.size * MM * self._shape.fineness
         pieces = cells(self._seed + 31, size, x, y)
         middle = self._shape.at(x - pieces.x, y - pieces.y)[0]
-        number = pieces.number.astype(np.int64)
-        shift = (uniform(32, number) - 0.62) * chunks.shift * MM * self._shape.fineness
+        shift = (uniform(32, pieces.number) - 0.62) * chunks.shift * MM * self._shape.fineness
         shift = np.where(shift < 0, 0.5 * shift, shift)
-        return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, number) < chunks.share), shift, 0.0)
+        return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, pieces.number) < chunks.share), shift, 0.0)
 
     def _rebuilt(self, places: _Places, wider: float) -> tuple[Array, Array, Array]:
         """Change of height and compression by the broken wall, and share of pressing; the wall is `wider` [m]."""
@@ -232,11 +231,10 @@ class PrintRelief:
 
     def _water_level(self, places: _Places) -> float:
         """Height of the water in the print, from the undisturbed ground [m]."""
-        water, relief = self._amounts.water, self._relief(places)
-        floor = places.inward > CORE * self._shape.fineness
+        water, floor = self._amounts.water, places.inward > CORE * self._shape.fineness
         if water is None or not floor.any():
             return -np.inf
-        heights = (places.rim - places.compression + relief.height)[floor]
+        heights = (places.rim - places.compression + self._relief(places).height)[floor]
         return float(np.percentile(heights, 50.0 * water.share) + water.above * MM * self._shape.fineness)
 
     def _standing(self, places: _Places, around: Around) -> Array:
