@@ -19,7 +19,7 @@ from ..motion.sole_motion import Sole, SolePatch
 from ..numerics.bilinear import sample_map
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
-from .undersides import continue_outside, lowest_surface, underside_map
+from .undersides import SUPERSAMPLING, continue_outside, underside_map
 
 FOOT_BREADTH = 0.373
 """Breadth over length of a foot: 10.06 cm / 26.97 cm, means of 1774 men (Gordon et al. 1989, NATICK/TR-89/044)."""
@@ -40,8 +40,8 @@ FOOT_TO_LEG = 0.152 / (0.245 + 0.246)
 NODES_PER_LENGTH = 54
 """Nodes along a sole: 5 mm apart for a foot of 27 cm."""
 
-TREAD_NODES = 192
-"""Nodes along a sole by which its tread is seen: 1.4 mm apart for a foot of 27 cm."""
+_MARGIN = 3
+"""Nodes of a map around the sole."""
 
 _SEAM = 0.06
 """Overlap of foot and toes over sole length, so that bent toes leave no gap under the ball."""
@@ -182,7 +182,7 @@ def sole_from_underside(
         )
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
-    heights, coverage = underside_map(
+    heights, coverage, samples = underside_map(
         np.asarray(vertices, dtype=float),
         triangles,
         grid.origin,
@@ -199,11 +199,9 @@ def sole_from_underside(
         )
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
     placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
-    low = used[:, :2].min(axis=0)
-    fine = float(extent[0]) / TREAD_NODES
-    columns, rows = np.ceil(extent / fine).astype(int)
-    drawn = lowest_surface(np.asarray(vertices, dtype=float), triangles, low + fine / 2, (rows, columns), fine)
-    drawn[drawn > drawn.min() + _UNDERSIDE_BAND * length] = np.inf
+    first = _MARGIN * SUPERSAMPLING + SUPERSAMPLING // 2
+    columns, rows = first + np.ceil(extent / grid.spacing * SUPERSAMPLING).astype(int)
+    drawn = samples[first:rows, first:columns]
     bend = 0.0 if ball is None or toe_weight is None else _bend(used, toe_weight[np.unique(triangles)], ball_x)
     return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T, bend=bend))
 
@@ -257,10 +255,10 @@ class _Grid:
     shape: tuple[int, int]
 
     @classmethod
-    def around(cls, points: Array, spacing: float, margin: int = 3) -> _Grid:
+    def around(cls, points: Array, spacing: float) -> _Grid:
         low, high = points.min(axis=0), points.max(axis=0)
-        columns, rows = np.ceil((high - low) / spacing).astype(int) + 2 * margin
-        return cls(low - margin * spacing, spacing, (int(rows), int(columns)))
+        columns, rows = np.ceil((high - low) / spacing).astype(int) + 2 * _MARGIN
+        return cls(low - _MARGIN * spacing, spacing, (int(rows), int(columns)))
 
     @property
     def nodes(self) -> Array:
