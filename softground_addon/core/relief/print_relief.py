@@ -175,7 +175,7 @@ class PrintRelief:
             if size >= self._finest:
                 for axis in (0, 1):
                     bend[axis] += amount * noise(self._seed + 2 * number + axis, size, x, y, *depth)
-        bent = shape.at(x + bend[0], y + bend[1])
+        bent = shape.at(x + bend[0], y + bend[1], 5)
         inward = bent[0]
         if amounts.chunks and amounts.chunks.size * MM * shape.fineness >= 2 * self._finest:
             inward = inward + self._chunks(amounts.chunks, x + 0.5 * bend[0], y + 0.5 * bend[1])
@@ -188,7 +188,7 @@ class PrintRelief:
         """Shift of places inward from the outline, by pieces of the edge that broke [m]."""
         size = chunks.size * MM * self._shape.fineness
         pieces = cells(self._seed + 31, size, x, y)
-        middle = self._shape.at(x - pieces.x, y - pieces.y)[0]
+        (middle,) = self._shape.at(x - pieces.x, y - pieces.y, 1)
         shift = (uniform(32, pieces.number) - 0.62) * chunks.shift * MM * self._shape.fineness
         shift = np.where(shift < 0, 0.5 * shift, shift)
         return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, pieces.number) < chunks.share), shift, 0.0)
