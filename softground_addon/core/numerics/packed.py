@@ -38,7 +38,7 @@ class PackedArray(Generic[Number]):
         self._kind, self._row, self._size = first.dtype, first.shape[1:], len(first)
         # Of neighbours, the high bytes are much the same and the low ones noise: each kind for itself packs better.
         by_significance = np.ascontiguousarray(_bytes_of(np.ascontiguousarray(first)).T)
-        self._parts = [zlib.compress(by_significance, LEVEL)]
+        self._parts = [zlib.compress(by_significance.data, LEVEL)]
 
     def __len__(self) -> int:
         return self._size

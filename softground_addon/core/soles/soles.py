@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,9 @@ FOOT_TO_LEG = 0.152 / (0.245 + 0.246)
 
 NODES_PER_LENGTH = 54
 """Nodes along a sole: 5 mm apart for a foot of 27 cm."""
+
+SOLES_REMEMBERED = 8
+"""Soles of meshes that are not worked out again when a rig is read again."""
 
 _MARGIN = 3
 """Nodes of a map around the sole."""
@@ -173,7 +177,19 @@ def sole_from_underside(
     InputError
         If the mesh has no underside to speak of.
     """
-    used = np.asarray(vertices, dtype=float)[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
+    arrays = (vertices, float), (triangles, np.intp), (toe_weight, float)
+    content = (None if values is None else np.asarray(values, kind).tobytes() for values, kind in arrays)
+    return _from_underside(*content, name, side, ball)
+
+
+@lru_cache(SOLES_REMEMBERED)
+def _from_underside(
+    places: bytes, corners: bytes, weights: bytes | None, name: str, side: str, ball: float | None
+) -> PlacedSole:
+    """See `sole_from_underside`: each reading of a rig asks for the same again."""
+    vertices, triangles = np.frombuffer(places).reshape(-1, 3), np.frombuffer(corners, np.intp).reshape(-1, 3)
+    toe_weight = None if weights is None else np.frombuffer(weights)
+    used = vertices[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
     extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
         raise InputError(
@@ -183,12 +199,7 @@ def sole_from_underside(
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
     heights, coverage, samples = underside_map(
-        np.asarray(vertices, dtype=float),
-        triangles,
-        grid.origin,
-        grid.shape,
-        grid.spacing,
-        band=_UNDERSIDE_BAND * length,
+        vertices, triangles, grid.origin, grid.shape, grid.spacing, band=_UNDERSIDE_BAND * length
     )
     loops = trace_loops(coverage, grid.origin, grid.spacing)
     loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
