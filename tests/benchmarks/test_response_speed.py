@@ -12,6 +12,7 @@ from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.legs.grounding import responding
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.numerics.key_reduction import kept_samples
+from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.response import GroundingOptions, TiltOptions, at_scene_frames, gaps, respond
 from tests.core.legs.test_grounding import walk
 
@@ -29,9 +30,10 @@ def test_a_thousand_frames_respond_within_a_second():
     simulated = time.thread_time() - started
     started = time.thread_time()
     touching = at_scene_frames(loads.contacts.touching, loads.motion.frames, motion)
-    response = respond(motion, touching, terrain, footprints, tilt=TiltOptions(), grounding=GroundingOptions())
+    history = GroundHistory(terrain, footprints)
+    response = respond(motion, touching, history, tilt=TiltOptions(), grounding=GroundingOptions())
     responded = time.thread_time() - started
-    gaps(responding(motion, response), touching, terrain, footprints)
+    gaps(responding(motion, response), touching, history)
     measured = time.thread_time() - started
     parts = [response.body, *(part for leg in response.legs.values() for part in (leg.thigh, leg.shank, leg.foot))]
     for part in parts:

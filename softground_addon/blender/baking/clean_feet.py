@@ -18,6 +18,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.intervals import runs
+from ...core.record.ground_history import GroundHistory
 from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, resting, standing
 from ...core.response.response import at_scene_frames, gaps
 from ...core.settings import BakeSettings, CharacterSettings
@@ -110,7 +111,7 @@ def _cleaned(
     responses: list[CharacterResponse] = []
     missed: list[str] = []
     feet: Faults = {"before": {}, "after": {}}
-    now = Progress("simulate", 1.0)
+    now, floor = Progress("simulate", 1.0), GroundHistory(shot.terrain)
     each = zip(shot.motions, loads, wanted.characters, strict=True)
     rigged = [entry for entry in each if entry[0].centre is None]
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
@@ -128,8 +129,8 @@ def _cleaned(
         for when, moved in (("before", motion), ("after", after)):
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain, stands))
             feet[when][motion.name] = _statistics(faults)
-        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), posed_rim))
-        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), posed_rim))
+        made = yield from meanwhile(now, gaps.slices(motion, touching, floor, posed_rim))
+        left = yield from meanwhile(now, gaps.slices(after, touching, floor, posed_rim))
         responses.append(CharacterResponse(motion, response, made, left, 0.0))
     return responses, feet, missed
 

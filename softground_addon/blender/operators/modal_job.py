@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar, Literal
 
@@ -107,7 +108,7 @@ class ModalJob(bpy.types.Operator):
         except StopIteration as finished:  # done at once, as with a shot that is known
             self._show(finished.value)
             return {"FINISHED"}
-        self._needed = _needed_by_job(scene)
+        self._needed = _needed_by_job(scene) | _named(_parts_of_bodies(scene))
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
@@ -311,8 +312,20 @@ def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
     options = scene.softground
     soles = [sole.object for character in options.characters for sole in character.soles]
     rigs = [character.armature or character.body for character in options.characters]
-    parts = [part for character in options.characters if character.body for part in character.body.children_recursive]
-    blocks = (scene, options.ground, *rigs, *parts, *soles)
+    return _named((scene, options.ground, *rigs, *soles))
+
+
+def _parts_of_bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """What bodies without an armature are made of; to find it, Blender goes through all objects of the file."""
+    return [
+        part
+        for character in scene.softground.characters
+        if character.body
+        for part in character.body.children_recursive
+    ]
+
+
+def _named(blocks: Iterable[bpy.types.ID | None]) -> dict[int, str]:
     return {block.session_uid: block.name for block in blocks if block}
 
 

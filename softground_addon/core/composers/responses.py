@@ -17,6 +17,7 @@ from ..loads.raised_rests import stands_on_hard
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
+from ..record.ground_history import GroundHistory
 from ..record.record import BakeRecord
 from ..response.leaving import leaving_early
 from ..response.moved_steps import Followed, OutOfReach, follow
@@ -87,7 +88,7 @@ def leaning(
     options: ResponseOptions | None,
 ) -> Slices[Leaning]:
     """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
-    moved, leans = [], []
+    moved, leans, history = [], [], GroundHistory(terrain, footprints)
     if options is not None and options.tilt is not None:
         for of_character, motion in zip(loads, motions, strict=True):
             if motion.centre is not None:
@@ -96,9 +97,7 @@ def leaning(
                 continue
             touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
             yield
-            response = yield from respond.slices(
-                motion, touching, terrain, footprints, tilt=options.tilt, grounding=None
-            )
+            response = yield from respond.slices(motion, touching, history, tilt=options.tilt, grounding=None)
             moved.append(responding(motion, response))
             leans.append(response.lean)
     return Leaning(tuple(moved), tuple(leans))
@@ -122,6 +121,7 @@ def responses_of(
     responses: list[CharacterResponse] = []
     if options is None:
         return responses
+    history = GroundHistory(terrain, left.edited)
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
@@ -131,12 +131,12 @@ def responses_of(
         pressed = standing, terrain, left.edited
         yield
         response = yield from respond.slices(
-            motion, *pressed, tilt=options.tilt, grounding=options.grounding, followed=followed
+            motion, touching, history, tilt=options.tilt, grounding=options.grounding, followed=followed
         )
         yield
-        before = yield from gaps.slices(motion, *pressed)
+        before = yield from gaps.slices(motion, touching, history)
         yield
-        after = yield from gaps.slices(responding(motion, response), *pressed)
+        after = yield from gaps.slices(responding(motion, response), touching, history)
         sinkage = mean_sinkage(left.edited, motion.name)
         responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses
@@ -159,11 +159,11 @@ def gap_table(
             when: {character.motion.name: _statistics(getattr(character, when)) for character in responses}
             for when in ("before", "after")
         }
-    table = {}
+    table, history = {}, GroundHistory(terrain, footprints)
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         yield
-        left = yield from gaps.slices(motion, touching, terrain, footprints)
+        left = yield from gaps.slices(motion, touching, history)
         table[motion.name] = _statistics(left)
     return {"before": table, "after": table}
 

@@ -142,12 +142,12 @@ class SampledHeights:
         low, high = 1.0 - u, 1.0 - v
         weights = (low * high, u * high, low * v, u * v)
         corners = [keys_of(first + shift) for shift in ((0, 0), (1, 0), (0, 1), (1, 1))]
-        self._look_up(np.unique(np.concatenate(corners)))
+        self._look_up(np.concatenate(corners))
         values = (self._values[np.searchsorted(self._keys, keys)] for keys in corners)
         return np.asarray(sum(weight * value for weight, value in zip(weights, values, strict=True)))
 
     def _look_up(self, wanted: NDArray[np.int64]) -> None:
-        new = wanted[~among(self._keys, wanted)]
+        new = np.unique(wanted[~among(self._keys, wanted)])
         if len(new):
             place = np.searchsorted(self._keys, new)
             self._values = np.insert(self._values, place, self._height(*(cells_of(new) * self._side).T))

@@ -181,13 +181,12 @@ def crowns(surface: str) -> Crowns:
 
 def _upper_side(lump: Lump, x: Array, y: Array) -> Array:
     """Highest point of a lump over places (N,), -1 beside it."""
-    highest = np.full(len(x), -1.0)
-    for a, b, c in lump.vertices[lump.faces]:
-        along, across = b - a, c - a
-        double = along[0] * across[1] - along[1] * across[0]
-        if double > 1e-12:  # seen from above
-            u = ((x - a[0]) * across[1] - (y - a[1]) * across[0]) / double
-            v = (along[0] * (y - a[1]) - along[1] * (x - a[0])) / double
-            inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-            highest[inside] = np.maximum(highest, a[2] + u * along[2] + v * across[2])[inside]
-    return highest
+    a, b, c = np.moveaxis(lump.vertices[lump.faces], 0, -1)[..., None]  # (3 axes, faces, 1) each
+    along, across = b - a, c - a
+    double = along[0] * across[1] - along[1] * across[0]
+    a, along, across, double = (each[..., double[:, 0] > 1e-12, :] for each in (a, along, across, double))  # from above
+    u = ((x - a[0]) * across[1] - (y - a[1]) * across[0]) / double
+    v = (along[0] * (y - a[1]) - along[1] * (x - a[0])) / double
+    inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+    height = a[2] + u * along[2] + v * across[2]
+    return np.asarray(np.max(height, axis=0, initial=-1.0, where=inside))

@@ -201,7 +201,7 @@ class SparseGrid:
         if used.any():
             stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()], axis=1)
             place = ((np.cumsum(used) - 1)[slot] * TILE + row[known] % TILE) * TILE + column[known] % TILE
-            values[:, known] = stack.reshape(self.channels, -1)[:, place]
+            values[:, known] = stack.reshape(self.channels, -1).take(place, axis=1)
         return values
 
 

@@ -60,30 +60,34 @@ def bend_lines(frames: Array, values: Array, knot: NDArray[np.bool_], margin: Ar
         The largest remaining distance.
     """
     count, points, channels = values.shape
-    # One point after the other, so that samples between two knots are contiguous.
-    rows, when = values.transpose(1, 0, 2).reshape(-1, channels), np.tile(frames, points)
-    error = np.zeros((points, channels))
+    # Channel by channel, and in each one point after the other, so that samples between two knots are contiguous.
+    rows, when = np.ascontiguousarray(values.T).reshape(channels, -1), np.tile(frames, points)
+    error = np.zeros((channels, points))
     at = np.flatnonzero(knot.T)
     begin, end = _with_samples_between(at[:-1], at[1:], count)
     while len(begin):
         inside = end - begin - 1
         first = np.cumsum(inside) - inside
-        line = np.repeat(np.arange(len(begin)), inside)
-        sample = np.arange(len(line)) - first[line] + begin[line] + 1
-        share = (when[sample] - when[begin][line]) / (when[end] - when[begin])[line]
-        rise = rows[end] - rows[begin]
-        missed = np.abs(rows[begin][line] + share[:, None] * rise[line] - rows[sample])
-        excess = (missed / margin[begin // count][line]).max(axis=1)
+        sample = np.arange(inside.sum()) + np.repeat(begin + 1 - first, inside)
+        share = (when[sample] - np.repeat(when[begin], inside)) / np.repeat(when[end] - when[begin], inside)
+        low = rows.take(begin, axis=1)
+        missed = np.repeat(rows.take(end, axis=1) - low, inside, axis=1)
+        missed *= share
+        missed += np.repeat(low, inside, axis=1)
+        missed -= rows.take(sample, axis=1)
+        np.abs(missed, out=missed)
+        excess = (missed / np.repeat(margin.T[:, begin // count], inside, axis=1)).max(axis=0)
         worst = np.maximum.reduceat(excess, first)
         fits = worst <= 1.0
-        np.maximum.at(error, begin[fits] // count, np.maximum.reduceat(missed, first)[fits])
-        farthest = np.flatnonzero(excess == worst[line])
-        bend = sample[farthest[np.searchsorted(line[farthest], np.flatnonzero(~fits))]]
+        for of_channel, gap in zip(error, np.maximum.reduceat(missed, first, axis=1), strict=True):
+            np.maximum.at(of_channel, begin[fits] // count, gap[fits])
+        farthest = np.flatnonzero(excess == np.repeat(worst, inside))
+        bend = sample[farthest[np.searchsorted(farthest, first[~fits])]]
         knot[bend % count, bend // count] = True
         begin, end = _with_samples_between(
             np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
         )
-    return error
+    return error.T
 
 
 def _with_samples_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:

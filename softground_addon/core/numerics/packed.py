@@ -37,8 +37,8 @@ class PackedArray(Generic[Number]):
     def __init__(self, first: NDArray[Number]) -> None:
         self._kind, self._row, self._size = first.dtype, first.shape[1:], len(first)
         # Of neighbours, the high bytes are much the same and the low ones noise: each kind for itself packs better.
-        by_significance = _bytes_of(np.ascontiguousarray(first)).T.tobytes()
-        self._parts = [zlib.compress(by_significance, LEVEL)]
+        by_significance = np.ascontiguousarray(_bytes_of(np.ascontiguousarray(first)).T)
+        self._parts = [zlib.compress(by_significance.data, LEVEL)]
 
     def __len__(self) -> int:
         return self._size
@@ -57,9 +57,11 @@ class PackedArray(Generic[Number]):
         whole: NDArray[Number] = np.empty((self._size, *self._row), self._kind)
         content, first = _bytes_of(whole), 0
         for part in map(zlib.decompress, self._parts):
-            values = np.frombuffer(part, np.uint8).reshape(self._kind.itemsize, -1).T
-            content[first : first + len(values)] = values
-            first += len(values)
+            planes = np.frombuffer(part, np.uint8).reshape(self._kind.itemsize, -1)
+            end = first + planes.shape[1]
+            for significance, plane in enumerate(planes):  # many times faster than all at once
+                content[first:end, significance] = plane
+            first = end
             yield
         return whole
 

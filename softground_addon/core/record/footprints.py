@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -154,7 +155,7 @@ class Footprint:
         first = changes.first[count:] - changes.first[count]
         return Changes(changes.frames[count:], first, changes.cells[begin:], changes.amounts[begin:])
 
-    @property
+    @cached_property
     def max_depth_m(self) -> float:
         """Largest compression of a cell by this contact [m], on top of earlier ones."""
         return float(self.tile(self.pressing).max(initial=0.0))

@@ -88,7 +88,8 @@ def _series(footprint: Footprint) -> _Print:
     change = np.zeros((len(frames) + 1, footprint.window.cells), dtype=np.float32)
     for part, sign in zip(parts, (-1.0, 1.0), strict=True):
         step = np.repeat(np.searchsorted(frames, part.frames) + 1, np.diff(part.first))
-        np.add.at(change, (step, part.cells), (sign * QUANTUM * part.amounts).astype(np.float32))
+        at = step * footprint.window.cells + part.cells
+        np.add.at(change.reshape(-1), at, (sign * QUANTUM * part.amounts).astype(np.float32))
     np.cumsum(change, axis=0, out=change)
     return _Print(footprint.window, frames, change)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred, gaussian_kernel
 from ..ground.heightfield import HeightField
-from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window
+from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, side_by_side
 from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
@@ -150,8 +150,7 @@ class PressedGround:
 
     def sample(self, x: Array, y: Array) -> GroundSample:
         """Look the ground up at places (K,), bilinear between the centres of cells."""
-        compression, rim = self.raw.sample(x, y)
-        smooth_compression, smooth_rim = self.smooth.sample(x, y)
+        compression, rim, smooth_compression, smooth_rim = side_by_side([self.raw, self.smooth]).sample(x, y)
         since = self.frame - self.contact.nearest(x, y)[0]
         age = np.where(np.isfinite(since), since / self.frame_rate, NEVER)
         return GroundSample(rim - compression, smooth_rim - smooth_compression, smooth_compression, smooth_rim, age)

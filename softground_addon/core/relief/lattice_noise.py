@@ -5,13 +5,13 @@ Whole numbers are hashed and polynomials interpolate, so that every platform giv
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64] | NDArray[np.uint32]
 Lattice = NDArray[np.uint32]
 
 DEVIATION = 0.65
@@ -22,7 +22,7 @@ ALONG_AN_AXIS = 181 / 231
 `_passage` p."""
 
 
-def hashed(seed: int, *lattice: NDArray[np.int64]) -> Lattice:
+def hashed(seed: int, *lattice: Whole) -> Lattice:
     """A random number for each place of a lattice, from 0 to 2³² - 1.
 
     The mixing steps are those of a 32-bit integer hash found by search [1]_.
@@ -31,9 +31,9 @@ def hashed(seed: int, *lattice: NDArray[np.int64]) -> Lattice:
     ----------
     .. [1] Wellons, C. (2018). Prospecting for Hash Functions. nullprogram.com/blog/2018/07/31 (lowbias32).
     """
-    value = np.full(np.broadcast_shapes(*(axis.shape for axis in lattice)), seed & 0xFFFFFFFF, dtype=np.uint32)
+    value = np.asarray(seed & 0xFFFFFFFF, dtype=np.uint32)
     for axis, step in zip(lattice, (0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D), strict=False):
-        value = value ^ (axis & 0xFFFFFFFF).astype(np.uint32) * np.uint32(step)
+        value = value ^ axis.astype(np.uint32) * np.uint32(step)
         value ^= value >> np.uint32(16)
         value = value * np.uint32(0x7FEB352D)
         value ^= value >> np.uint32(15)
@@ -42,7 +42,7 @@ def hashed(seed: int, *lattice: NDArray[np.int64]) -> Lattice:
     return value
 
 
-def uniform(seed: int, *lattice: NDArray[np.int64]) -> Array:
+def uniform(seed: int, *lattice: Whole) -> Array:
     """A random number for each place of a lattice, from 0 to 1."""
     return np.asarray(hashed(seed, *lattice) * 2.0**-32)
 
@@ -81,49 +81,31 @@ def noise(seed: int, size: float, *place: Array) -> Array:
     >>> bool(value[0] == value[1]), bool(abs(value[0] - value[2]) < 1e-6), bool(value[0] == noise(8, 0.02, at, at)[0])
     (True, True, False)
     """
-    whole, share = [], []
-    for axis in place:
-        at = axis / size
-        cell = np.floor(at)
-        whole.append(cell.astype(np.int64))
-        share.append(_passage(at - cell))
-    return np.asarray(
-        _between(_values(seed, whole), whole, share) * (DEVIATION * np.sqrt(3.0 / ALONG_AN_AXIS ** len(place)))
-    )
+    if not len(place[0]):
+        return np.zeros(0)
+    at = [axis / size for axis in place]
+    cell = [np.floor(axis) for axis in at]
+    values = _corners(seed, [axis.astype(np.int64) for axis in cell])
+    for axis, first in zip(at[::-1], cell[::-1], strict=True):  # between the corners, along one axis after the other
+        low, high = values[..., 0, :], values[..., 1, :]
+        values = low + _passage(axis - first) * (high - low)
+    return np.asarray(values * (DEVIATION * np.sqrt(3.0 / ALONG_AN_AXIS ** len(place))))
 
 
-def _values(seed: int, cells: list[NDArray[np.int64]]) -> Callable[[list[NDArray[np.int64]]], Array]:
-    """Look-up of a lattice's values, from -1 to 1: in a box around the cells if it is small, else each hashed."""
-    low = [int(axis.min(initial=0)) for axis in cells]
-    size = [int(axis.max(initial=0)) + 2 - first for axis, first in zip(cells, low, strict=True)]
+def _corners(seed: int, cells: list[NDArray[np.int64]]) -> Array:
+    """A lattice's values, from -1 to 1, at the corners of cells (N,): (2, ..., 2, N), low and high along each axis.
+
+    They are looked up in a box around the cells if it is small, else each is hashed.
+    """
+    both = [np.arange(2).reshape(-1, *[1] * (len(cells) - k)) for k in range(len(cells))]
+    low, size = [int(axis.min()) for axis in cells], [int(np.ptp(axis)) + 2 for axis in cells]
     if np.prod(size, dtype=float) > 8 * len(cells[0]):
-        return lambda corner: uniform(seed, *corner) * 2.0 - 1.0
+        return uniform(seed, *(axis + ends for axis, ends in zip(cells, both, strict=True))) * 2.0 - 1.0
     axes = [np.arange(first, first + count, dtype=np.int64) for first, count in zip(low, size, strict=True)]
-    box = (uniform(seed, *np.meshgrid(*axes, indexing="ij", sparse=True)) * 2.0 - 1.0).ravel()
+    box = uniform(seed, *np.meshgrid(*axes, indexing="ij", sparse=True)) * 2.0 - 1.0
     strides = np.cumprod([1, *size[:0:-1]])[::-1].tolist()
-    start = sum(first * stride for first, stride in zip(low, strides, strict=True))
-
-    def look_up(corner: list[NDArray[np.int64]]) -> Array:
-        at = corner[0] * strides[0] - start
-        for axis, stride in zip(corner[1:], strides[1:], strict=True):
-            at = at + axis * stride
-        return np.asarray(box[at])
-
-    return look_up
-
-
-def _between(
-    look_up: Callable[[list[NDArray[np.int64]]], Array],
-    corner: list[NDArray[np.int64]],
-    share: list[Array],
-    axis: int = 0,
-) -> Array:
-    """Values of a lattice between its places, along one axis after the other."""
-    if axis == len(corner):
-        return look_up(corner)
-    further = [*corner[:axis], corner[axis] + 1, *corner[axis + 1 :]]
-    low, high = (_between(look_up, each, share, axis + 1) for each in (corner, further))
-    return np.asarray(low + share[axis] * (high - low))
+    at = sum((axis - first) * stride for axis, first, stride in zip(cells, low, strides, strict=True))
+    return box.ravel()[at + sum(ends * stride for ends, stride in zip(both, strides, strict=True))]
 
 
 def fractal(seed: int, size: float, octaves: int, gain: float, *place: Array, finest: float = 0.0) -> Array:
@@ -164,18 +146,13 @@ def cells(seed: int, size: float, x: Array, y: Array) -> Cells:
     """
     u, v = x / size, y / size
     column, row = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
-    nearest, second = np.full(len(u), np.inf), np.full(len(u), np.inf)
-    number = np.zeros(len(u), dtype=np.uint32)
-    away = np.zeros((2, len(u)))
-    for j in (-1, 0, 1):
-        for i in (-1, 0, 1):
-            value = hashed(seed, column + i, row + j)
-            dx = u - column - i - (value & np.uint32(0xFFFF)) * 2.0**-16
-            dy = v - row - j - (value >> np.uint32(16)) * 2.0**-16
-            distance = dx * dx + dy * dy
-            closer = distance < nearest
-            second = np.where(closer, nearest, np.minimum(second, distance))
-            nearest = np.where(closer, distance, nearest)
-            number = np.where(closer, value, number)
-            away = np.where(closer, np.stack([dx, dy]), away)
-    return Cells(number, (np.sqrt(second) - np.sqrt(nearest)) * size, *(away * size))
+    i, j = (beside.reshape(-1, 1) for beside in np.meshgrid(*[np.arange(-1, 2)] * 2))  # of the squares around, (9, 1)
+    value = hashed(seed, column + i, row + j)
+    dx = u - column - i - (value & np.uint32(0xFFFF)) * 2.0**-16
+    dy = v - row - j - (value >> np.uint32(16)) * 2.0**-16
+    distance = dx * dx + dy * dy
+    own = np.argmin(distance, axis=0), np.arange(len(u))
+    nearest = distance[own]
+    distance[own] = np.inf
+    to_edge = np.sqrt(distance.min(axis=0)) - np.sqrt(nearest)
+    return Cells(value[own], to_edge * size, dx[own] * size, dy[own] * size)

@@ -223,7 +223,7 @@ class Cracks:
 
     def _plates(self, around: Around, plates: Cells) -> Array:
         """Height of each plate [m]."""
-        lift, along, across = (uniform(seed, plates.number.astype(np.int64)) for seed in (1, 2, 3))
+        lift, along, across = (uniform(seed, plates.number) for seed in (1, 2, 3))
         slope = (2.0 * along - 1.0) * plates.x + (2.0 * across - 1.0) * plates.y
         return self.tilt * slope + around.length(self.lowest) + lift * around.length(self.highest - self.lowest)
 

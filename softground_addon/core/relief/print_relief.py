@@ -175,7 +175,7 @@ class PrintRelief:
             if size >= self._finest:
                 for axis in (0, 1):
                     bend[axis] += amount * noise(self._seed + 2 * number + axis, size, x, y, *depth)
-        bent = shape.at(x + bend[0], y + bend[1])
+        bent = shape.at(x + bend[0], y + bend[1], 5)
         inward = bent[0]
         if amounts.chunks and amounts.chunks.size * MM * shape.fineness >= 2 * self._finest:
             inward = inward + self._chunks(amounts.chunks, x + 0.5 * bend[0], y + 0.5 * bend[1])
@@ -188,11 +188,10 @@ class PrintRelief:
         """Shift of places inward from the outline, by pieces of the edge that broke [m]."""
         size = chunks.size * MM * self._shape.fineness
         pieces = cells(self._seed + 31, size, x, y)
-        middle = self._shape.at(x - pieces.x, y - pieces.y)[0]
-        number = pieces.number.astype(np.int64)
-        shift = (uniform(32, number) - 0.62) * chunks.shift * MM * self._shape.fineness
+        (middle,) = self._shape.at(x - pieces.x, y - pieces.y, 1)
+        shift = (uniform(32, pieces.number) - 0.62) * chunks.shift * MM * self._shape.fineness
         shift = np.where(shift < 0, 0.5 * shift, shift)
-        return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, number) < chunks.share), shift, 0.0)
+        return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, pieces.number) < chunks.share), shift, 0.0)
 
     def _rebuilt(self, places: _Places, wider: float) -> tuple[Array, Array, Array]:
         """Change of height and compression by the broken wall, and share of pressing; the wall is `wider` [m]."""
@@ -232,11 +231,10 @@ class PrintRelief:
 
     def _water_level(self, places: _Places) -> float:
         """Height of the water in the print, from the undisturbed ground [m]."""
-        water, relief = self._amounts.water, self._relief(places)
-        floor = places.inward > CORE * self._shape.fineness
+        water, floor = self._amounts.water, places.inward > CORE * self._shape.fineness
         if water is None or not floor.any():
             return -np.inf
-        heights = (places.rim - places.compression + relief.height)[floor]
+        heights = (places.rim - places.compression + self._relief(places).height)[floor]
         return float(np.percentile(heights, 50.0 * water.share) + water.above * MM * self._shape.fineness)
 
     def _standing(self, places: _Places, around: Around) -> Array:

@@ -80,9 +80,9 @@ class PrintShape:
     along: tuple[float, float]
     across: tuple[float, float]
 
-    def at(self, x: Array, y: Array) -> Array:
-        """The fields at world places (N,), bilinear between cells, (8, N)."""
-        return self._between(self.fields, x, y)
+    def at(self, x: Array, y: Array, count: int = 8) -> Array:
+        """The first fields, all by default, at world places (N,), bilinear between cells, (count, N)."""
+        return self._between(self.fields[:count], x, y)
 
     def moves(self, x: Array, y: Array) -> Mask:
         """True for world places (N,) at which the print moves the ground."""
@@ -210,7 +210,7 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     below = np.maximum.accumulate(np.where(chosen, row, -far - rows), axis=0)
     above = np.minimum.accumulate(np.where(chosen, row, 2 * rows + far)[::-1], axis=0)[::-1]
     source = np.where(row - below <= above - row, below, above)
-    high = np.minimum(np.abs(source - row), far + 1).astype(np.float64) ** 2
+    high = np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2
     best = high.copy()
     which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
     in_column = which.copy()
@@ -218,8 +218,8 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
         for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
             distance = high[:, beside] + shift * shift
             closer = distance < best[:, to]
-            best[:, to] = np.where(closer, distance, best[:, to])
-            which[:, to] = np.where(closer, in_column[:, beside], which[:, to])
+            np.copyto(best[:, to], distance, where=closer)
+            np.copyto(which[:, to], in_column[:, beside], where=closer)
     return np.minimum(np.sqrt(best), float(far)), which
 
 

@@ -23,7 +23,7 @@ SUNK = 0.7
 
 @dataclass(frozen=True)
 class ScatteredCrumbs:
-    """The crumbs of one size about a print, from one to twice it.
+    """The crumbs of one size about a print, from one to twice it, in layers upon each other.
 
     Attributes
     ----------
@@ -33,13 +33,13 @@ class ScatteredCrumbs:
         Column and row of the first square.
     crowns : Crowns
         Their shapes from above.
-    x, y, radius : (rows, columns) float arrays
+    x, y, radius : (layers, rows, columns) float arrays
         Of the crumb in each square [m]; the radius is 0 where there is none.
-    sunk : (rows, columns) float array
+    sunk : (layers, rows, columns) float array
         Depth of its middle below the ground, over its radius.
-    turn : (rows, columns) float array
+    turn : (layers, rows, columns) float array
         About the vertical [rad].
-    shape : (rows, columns) int array
+    shape : (layers, rows, columns) int array
         Number among the crowns.
     """
 
@@ -55,25 +55,22 @@ class ScatteredCrumbs:
 
     def heights(self, around: Around) -> Array:
         """Heights [m]."""
-        rows, columns = self.radius.shape
+        layers, rows, columns = self.radius.shape
         first = [
             np.floor(place / self.side - 0.5).astype(np.intp) - corner
             for place, corner in zip((around.x, around.y), self.corner, strict=True)
         ]
-        highest = np.zeros(len(around.x))
+        highest = np.zeros((layers, len(around.x)))
         for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            column, row = first[0] + right, first[1] + up
-            square = np.clip(row, 0, rows - 1) * columns + np.clip(column, 0, columns - 1)
-            radius = self.radius.ravel()[square]
-            dx, dy = around.x - self.x.ravel()[square], around.y - self.y.ravel()[square]
-            near = np.flatnonzero(dx * dx + dy * dy < (self.crowns.reach * radius) ** 2)
-            square, radius, dx, dy = square[near], radius[near], dx[near], dy[near]
-            cos, sin = np.cos(self.turn.ravel()[square]), np.sin(self.turn.ravel()[square])
-            top = self.crowns.at(
-                self.shape.ravel()[square], (cos * dx + sin * dy) / radius, (cos * dy - sin * dx) / radius
-            )
-            highest[near] = np.maximum(highest[near], radius * (top - self.sunk.ravel()[square]))
-        return highest
+            column, row = np.clip(first[0] + right, 0, columns - 1), np.clip(first[1] + up, 0, rows - 1)
+            dx, dy = around.x - self.x[:, row, column], around.y - self.y[:, row, column]
+            reach = self.crowns.reach * self.radius[:, row, column]
+            near = np.nonzero(dx * dx + dy * dy < reach * reach)
+            crumb, dx, dy = (near[0], row[near[1]], column[near[1]]), dx[near], dy[near]
+            radius, cos, sin = self.radius[crumb], np.cos(self.turn[crumb]), np.sin(self.turn[crumb])
+            top = self.crowns.at(self.shape[crumb], (cos * dx + sin * dy) / radius, (cos * dy - sin * dx) / radius)
+            highest[near] = np.maximum(highest[near], radius * (top - self.sunk[crumb]))
+        return np.asarray(highest.sum(axis=0))
 
 
 def scattered(
@@ -87,7 +84,7 @@ def scattered(
     smallest: float,
     fineness: float,
 ) -> list[ScatteredCrumbs]:
-    """The crumbs of a surface in a rectangle.
+    """The crumbs of a surface in a rectangle, size by size.
 
     Parameters
     ----------
@@ -105,31 +102,33 @@ def scattered(
     fineness : float
         See `PrintShape`.
     """
-    crowns, largest, layered = crumbs.crowns(surface), surfaces.find(surface).fragments.largest, []
-    for number, (size, full) in enumerate(crumbs.octaves(largest * fineness, smallest)):
-        layers = max(1, int(np.ceil(share * full)))  # of what is fuller than full
-        for layer in range(layers):
-            layered.append(_layer(crowns, seed + 10 * number + layer, size, (low, high), share * full / layers, chance))
-    return layered
+    crowns, largest = crumbs.crowns(surface), surfaces.find(surface).fragments.largest
+    return [
+        _of_size(crowns, seed + 10 * number, size, (low, high), share * full, chance)
+        for number, (size, full) in enumerate(crumbs.octaves(largest * fineness, smallest))
+    ]
 
 
-def _layer(
+def _of_size(
     crowns: crumbs.Crowns,
     seed: int,
     size: float,
     corners: tuple[Array, Array],
-    full: float,
+    share: float,
     chance: Callable[[Array, Array], Array],
 ) -> ScatteredCrumbs:
+    layers = max(1, int(np.ceil(share)))  # of what is fuller than full
     side = size * crowns.reach  # so that a crumb reaches no further than half a square
     first, last = (np.floor(place / side).astype(np.int64) for place in corners)
     column, row = np.meshgrid(*(np.arange(a - 1, b + 2) for a, b in zip(first, last, strict=True)))
-    value = hashed(seed, column, row)
-    luck = [uniform(kind, value.astype(np.int64)) for kind in range(5)]
+    value = np.stack([hashed(seed + layer, column, row) for layer in range(layers)])
+    luck = [uniform(kind, value) for kind in range(5)]
     x = (column + (value & np.uint32(0xFFFF)) * 2.0**-16) * side
     y = (row + (value >> np.uint32(16)) * 2.0**-16) * side
-    present = luck[0] < full * chance(x.ravel(), y.ravel()).reshape(x.shape)
-    radius = np.where(present, crumbs.diameters((size / 2.0, size), luck[1]) / 2.0, 0.0)
+    radius = np.zeros(value.shape)
+    drawn = luck[0] < share / layers  # however dense they lie here
+    drawn[drawn] = luck[0][drawn] < share / layers * chance(x[drawn], y[drawn])
+    radius[drawn] = crumbs.diameters((size / 2.0, size), luck[1][drawn]) / 2.0
     shape = (luck[4] * len(crowns.heights)).astype(np.intp)
     corner = (int(column[0, 0]), int(row[0, 0]))
     return ScatteredCrumbs(side, corner, crowns, x, y, radius, SUNK * luck[2], 2 * np.pi * luck[3], shape)

@@ -96,8 +96,7 @@ class Gaps:
 def respond(
     motion: CharacterMotion,
     touching: Mask,
-    terrain: Terrain,
-    footprints: Sequence[Footprint],
+    history: GroundHistory,
     *,
     tilt: TiltOptions | None,
     grounding: GroundingOptions | None,
@@ -111,16 +110,13 @@ def respond(
         The source, at scene frames.
     touching : (F, S) bool array
         At scene frames.
-    terrain : Terrain
-        The undisturbed ground.
-    footprints : sequence of Footprint
-        All that the ground holds, of all characters.
+    history : GroundHistory
+        With all footprints that the ground holds, of all characters.
     tilt, grounding : options, or None to leave that out
     followed : Followed, optional
         Where moved steps take the feet; only with grounding.
     """
-    history = GroundHistory(terrain, footprints)
-    undisturbed = GroundHistory(terrain)
+    undisturbed = GroundHistory(history.terrain)
     feet = leg_soles(motion)
     leaning = np.zeros((len(motion.frames), 2))
     if tilt is not None:
@@ -232,12 +228,10 @@ def _heading(motion: CharacterMotion) -> Array:
 def gaps(
     motion: CharacterMotion,
     touching: Mask,
-    terrain: Terrain,
-    footprints: Sequence[Footprint],
+    history: GroundHistory,
     posed: Callable[[SoleMotion], Array] = posed_points,
 ) -> Slices[Gaps]:
     """Distance of the lowest of each standing sole's `posed` points from the ground as it is at that frame."""
-    history = GroundHistory(terrain, footprints)
     frames, soles, heights = [], [], []
     for index, sole in enumerate(motion.soles):
         yield

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from ..motion.sole_motion import Sole, SolePatch
 from ..numerics.bilinear import sample_map
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
-from .undersides import continue_outside, lowest_surface, underside_map
+from .undersides import SUPERSAMPLING, continue_outside, underside_map
 
 FOOT_BREADTH = 0.373
 """Breadth over length of a foot: 10.06 cm / 26.97 cm, means of 1774 men (Gordon et al. 1989, NATICK/TR-89/044)."""
@@ -40,8 +41,11 @@ FOOT_TO_LEG = 0.152 / (0.245 + 0.246)
 NODES_PER_LENGTH = 54
 """Nodes along a sole: 5 mm apart for a foot of 27 cm."""
 
-TREAD_NODES = 192
-"""Nodes along a sole by which its tread is seen: 1.4 mm apart for a foot of 27 cm."""
+SOLES_REMEMBERED = 8
+"""Soles of meshes that are not worked out again when a rig is read again."""
+
+_MARGIN = 3
+"""Nodes of a map around the sole."""
 
 _SEAM = 0.06
 """Overlap of foot and toes over sole length, so that bent toes leave no gap under the ball."""
@@ -173,7 +177,19 @@ def sole_from_underside(
     InputError
         If the mesh has no underside to speak of.
     """
-    used = np.asarray(vertices, dtype=float)[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
+    arrays = (vertices, float), (triangles, np.intp), (toe_weight, float)
+    content = (None if values is None else np.asarray(values, kind).tobytes() for values, kind in arrays)
+    return _from_underside(*content, name, side, ball)
+
+
+@lru_cache(SOLES_REMEMBERED)
+def _from_underside(
+    places: bytes, corners: bytes, weights: bytes | None, name: str, side: str, ball: float | None
+) -> PlacedSole:
+    """See `sole_from_underside`: each reading of a rig asks for the same again."""
+    vertices, triangles = np.frombuffer(places).reshape(-1, 3), np.frombuffer(corners, np.intp).reshape(-1, 3)
+    toe_weight = None if weights is None else np.frombuffer(weights)
+    used = vertices[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
     extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
         raise InputError(
@@ -182,13 +198,8 @@ def sole_from_underside(
         )
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
-    heights, coverage = underside_map(
-        np.asarray(vertices, dtype=float),
-        triangles,
-        grid.origin,
-        grid.shape,
-        grid.spacing,
-        band=_UNDERSIDE_BAND * length,
+    heights, coverage, samples = underside_map(
+        vertices, triangles, grid.origin, grid.shape, grid.spacing, band=_UNDERSIDE_BAND * length
     )
     loops = trace_loops(coverage, grid.origin, grid.spacing)
     loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
@@ -199,11 +210,9 @@ def sole_from_underside(
         )
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
     placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
-    low = used[:, :2].min(axis=0)
-    fine = float(extent[0]) / TREAD_NODES
-    columns, rows = np.ceil(extent / fine).astype(int)
-    drawn = lowest_surface(np.asarray(vertices, dtype=float), triangles, low + fine / 2, (rows, columns), fine)
-    drawn[drawn > drawn.min() + _UNDERSIDE_BAND * length] = np.inf
+    first = _MARGIN * SUPERSAMPLING + SUPERSAMPLING // 2
+    columns, rows = first + np.ceil(extent / grid.spacing * SUPERSAMPLING).astype(int)
+    drawn = samples[first:rows, first:columns]
     bend = 0.0 if ball is None or toe_weight is None else _bend(used, toe_weight[np.unique(triangles)], ball_x)
     return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T, bend=bend))
 
@@ -257,10 +266,10 @@ class _Grid:
     shape: tuple[int, int]
 
     @classmethod
-    def around(cls, points: Array, spacing: float, margin: int = 3) -> _Grid:
+    def around(cls, points: Array, spacing: float) -> _Grid:
         low, high = points.min(axis=0), points.max(axis=0)
-        columns, rows = np.ceil((high - low) / spacing).astype(int) + 2 * margin
-        return cls(low - margin * spacing, spacing, (int(rows), int(columns)))
+        columns, rows = np.ceil((high - low) / spacing).astype(int) + 2 * _MARGIN
+        return cls(low - _MARGIN * spacing, spacing, (int(rows), int(columns)))
 
     @property
     def nodes(self) -> Array:

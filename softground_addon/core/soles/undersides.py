@@ -9,7 +9,7 @@ from ..numerics.triangles import SLACK, cross
 
 Array = NDArray[np.float64]
 
-_SUPERSAMPLING = 4
+SUPERSAMPLING = 4
 """Samples per node along each axis; edges are then known to a few per cent of the node distance."""
 
 _PAIR_BLOCK = 2_000_000
@@ -30,7 +30,7 @@ def underside_map(
     spacing: float,
     *,
     band: float = np.inf,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Height of the lowest surface over each node of a grid, and the share of the node's cell that it covers.
 
     Parameters
@@ -52,20 +52,22 @@ def underside_map(
         Mean height of the underside in the node's cell [m], NaN where nothing counts.
     coverage : (rows, columns) float array
         Covered fraction of the node's cell.
+    samples : (rows·SUPERSAMPLING, columns·SUPERSAMPLING) float array
+        Height at each sample [m], infinite where nothing counts.
     """
-    fine = spacing / _SUPERSAMPLING
+    fine = spacing / SUPERSAMPLING
     fine_origin = np.asarray(origin) - spacing / 2 + fine / 2
     rows, columns = shape
-    lowest = lowest_surface(vertices, triangles, fine_origin, (rows * _SUPERSAMPLING, columns * _SUPERSAMPLING), fine)
-    counts = lowest <= lowest.min() + band if np.isfinite(lowest).any() else np.zeros(lowest.shape, dtype=bool)
-    counts &= np.isfinite(lowest)
+    lowest = lowest_surface(vertices, triangles, fine_origin, (rows * SUPERSAMPLING, columns * SUPERSAMPLING), fine)
+    lowest[lowest > lowest.min() + band] = np.inf
+    counts = np.isfinite(lowest)
 
-    cells = (rows, _SUPERSAMPLING, columns, _SUPERSAMPLING)
+    cells = (rows, SUPERSAMPLING, columns, SUPERSAMPLING)
     samples = counts.reshape(cells).sum(axis=(1, 3))
     total = np.where(counts, lowest, 0.0).reshape(cells).sum(axis=(1, 3))
     with np.errstate(invalid="ignore"):
         heights = np.where(samples > 0, total / samples, np.nan)
-    return heights, samples / _SUPERSAMPLING**2
+    return heights, samples / SUPERSAMPLING**2, lowest
 
 
 def lowest_surface(
@@ -147,11 +149,15 @@ def continue_outside(heights: Array) -> Array:
     """
     known = np.isfinite(heights)
     border = np.pad(_spread_nearest(heights, known), 1, mode="edge")
+    inner, mean, unknown = border[1:-1, 1:-1], np.empty_like(heights), ~known
     for _ in range(_RELAXATIONS):
         border[0], border[-1], border[:, 0], border[:, -1] = border[1], border[-2], border[:, 1], border[:, -2]
-        mean = (border[:-2, 1:-1] + border[2:, 1:-1] + border[1:-1, :-2] + border[1:-1, 2:]) / 4
-        border[1:-1, 1:-1] = np.where(known, heights, mean)
-    return border[1:-1, 1:-1].copy()
+        np.add(border[:-2, 1:-1], border[2:, 1:-1], out=mean)
+        mean += border[1:-1, :-2]
+        mean += border[1:-1, 2:]
+        mean *= 0.25
+        np.copyto(inner, mean, where=unknown)
+    return inner.copy()
 
 
 def _spread_nearest(heights: Array, known: NDArray[np.bool_]) -> Array:

@@ -76,21 +76,21 @@ def test_what_lies_about_a_print_is_the_upper_side_of_what_flies():
     (one, *_) = scattered(baked("soil"), "soil")
     lumps = crumbs.lumps("soil")
     lattice = one.crumbs[-1]
-    rows, columns = np.nonzero(lattice.radius)
-    for row, column in zip(rows, columns, strict=True):
-        place = [np.array([at[row, column]]) for at in (lattice.x, lattice.y)]
+    crumbs_there = list(zip(*np.nonzero(lattice.radius), strict=True))
+    for crumb in crumbs_there:
+        place = [np.array([at[crumb]]) for at in (lattice.x, lattice.y)]
         nothing = np.zeros(1)
         around = Around(0, *place, nothing, nothing, nothing, nothing, 0.001, 1.0)
-        lump = lumps[lattice.shape[row, column]].vertices
+        lump = lumps[lattice.shape[crumb]].vertices
         axis = np.linalg.norm(lump[:, :2], axis=1)
         top = lump[(axis < 0.3) & (lump[:, 2] > 0), 2]
-        radius, sunk = lattice.radius[row, column], lattice.sunk[row, column]
+        radius, sunk = lattice.radius[crumb], lattice.sunk[crumb]
         is_other = np.ones(lattice.radius.shape, bool)
-        is_other[row, column] = False
+        is_other[crumb] = False
         alone = replace(lattice, radius=np.where(is_other, 0.0, lattice.radius))
         height = alone.heights(around)[0] / radius + sunk
         assert top.min() - 0.1 < height < top.max() + 0.1
-    assert len(rows) > 30
+    assert len(crumbs_there) > 30
 
 
 @pytest.mark.parametrize("surface", sorted(SURFACES))

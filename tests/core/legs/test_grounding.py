@@ -11,6 +11,7 @@ from softground_addon.core.legs.grounding import Response, leg_of, leg_soles, re
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.motion.motion import CharacterMotion
 from softground_addon.core.motion.sole_motion import Sole, SoleMotion
+from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response import response
 from softground_addon.core.response.response import GroundingOptions, TiltOptions, gaps, respond, stood_on
 from tests.core.walkers import foot_sole, pose
@@ -212,7 +213,9 @@ def test_a_sole_that_never_touches_is_left_alone():
 
 def test_a_sole_without_an_underside_has_no_gap_to_the_ground():
     motion, touching = walk()
-    left = gaps(motion, touching, FlatTerrain(), [], lambda sole: posed_points(sole, [(0, np.empty((0, 3)))]))
+    left = gaps(
+        motion, touching, GroundHistory(FlatTerrain()), lambda sole: posed_points(sole, [(0, np.empty((0, 3)))])
+    )
     assert not len(left.heights)
 
 
@@ -224,7 +227,7 @@ def test_without_grounding_a_lean_keeps_the_feet_where_they_are():
         def heights(self, x, y):
             return slope * x + 0.0 * y
 
-    response = respond(motion, touching, Rise(), (), tilt=TiltOptions(strength=1.0), grounding=None)
+    response = respond(motion, touching, GroundHistory(Rise()), tilt=TiltOptions(strength=1.0), grounding=None)
     assert np.degrees(response.lean[:, 0]) == pytest.approx(np.full(len(response.lean), 10.0), abs=0.5)
     moved = responding(motion, response)
     for side in "lr":
@@ -235,9 +238,11 @@ def test_without_grounding_a_lean_keeps_the_feet_where_they_are():
 
 def test_on_rigid_level_ground_there_is_no_response():
     motion, touching = walk()
-    response = respond(motion, touching, FlatTerrain(0.0), (), tilt=TiltOptions(), grounding=None)
+    response = respond(motion, touching, GroundHistory(FlatTerrain(0.0)), tilt=TiltOptions(), grounding=None)
     assert response.is_none
-    response = respond(motion, touching, FlatTerrain(0.0), (), tilt=TiltOptions(), grounding=GroundingOptions())
+    response = respond(
+        motion, touching, GroundHistory(FlatTerrain(0.0)), tilt=TiltOptions(), grounding=GroundingOptions()
+    )
     assert responding(motion, response).joints["hips"] == pytest.approx(motion.joints["hips"], abs=2e-3)
 
 

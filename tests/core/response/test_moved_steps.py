@@ -9,6 +9,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.legs.grounding import leg_of, leg_soles, responding
 from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.moved_steps import DEEPEST, follow
 from softground_addon.core.response.response import GroundingOptions, respond
 from tests.core.legs.test_grounding import walk
@@ -38,8 +39,8 @@ def followed_by(edit, name="foot.L"):
     prints = prints_of(motion, touching)
     step = second_of(prints, name)
     found = follow(motion, touching, prints, {step_id(step): edit})
-    plain = respond(motion, touching, FLOOR, (), tilt=None, grounding=GroundingOptions())
-    answer = respond(motion, touching, FLOOR, (), tilt=None, grounding=GroundingOptions(), followed=found)
+    plain = respond(motion, touching, GroundHistory(FLOOR), tilt=None, grounding=GroundingOptions())
+    answer = respond(motion, touching, GroundHistory(FLOOR), tilt=None, grounding=GroundingOptions(), followed=found)
     return responding(motion, plain), responding(motion, answer), step, found
 
 
