@@ -128,15 +128,14 @@ def responses_of(
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
         standing = leaving_early(motion, touching, left.edited) if options.grounding else touching
-        pressed = standing, terrain, left.edited
         yield
         response = yield from respond.slices(
-            motion, touching, history, tilt=options.tilt, grounding=options.grounding, followed=followed
+            motion, standing, history, tilt=options.tilt, grounding=options.grounding, followed=followed
         )
         yield
-        before = yield from gaps.slices(motion, touching, history)
+        before = yield from gaps.slices(motion, standing, history)
         yield
-        after = yield from gaps.slices(responding(motion, response), touching, history)
+        after = yield from gaps.slices(responding(motion, response), standing, history)
         sinkage = mean_sinkage(left.edited, motion.name)
         responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses

@@ -8,6 +8,7 @@ import pytest
 from softground_addon.core.composers.responses import DEEP_FOR_A_WALK, CharacterResponse, response_findings
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.numerics.intervals import runs
+from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.leaving import LEAVE_TIME, leaving_early
 from softground_addon.core.response.response import GroundingOptions, gaps, respond
 from tests.core.legs.test_grounding import LEG, RATE, walk
@@ -62,9 +63,9 @@ def test_prints_of_others_do_not_count():
 @pytest.mark.parametrize(("legs", "codes"), [(0.95, []), (1.05, ["deep_for_this_walk"])])
 def test_a_walk_that_sinks_too_deep_to_wade_is_named_with_a_remedy(legs, codes):
     motion, touching = walk()
-    floor = FlatTerrain(0.0)
-    response = respond(motion, touching, floor, (), tilt=None, grounding=GroundingOptions())
-    left = gaps(motion, touching, floor, ())
+    floor = GroundHistory(FlatTerrain(0.0))
+    response = respond(motion, touching, floor, tilt=None, grounding=GroundingOptions())
+    left = gaps(motion, touching, floor)
     depth = legs * DEEP_FOR_A_WALK * LEG
     findings = response_findings([CharacterResponse(motion, response, left, left, depth)])
     assert [finding.code for finding in findings] == codes
