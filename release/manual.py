@@ -16,6 +16,9 @@ FOLDER = "manual"
 _NOT_IN_IT = {"development", "gallery", "library", "publishing"}
 """Pages for those who make the add-on or work without Blender, and one that is only pictures."""
 
+_FIRST = "docs/shots.md"
+"""Page that the manual opens with."""
+
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -39,17 +42,15 @@ code {{ background: #f3f3f3; }}
 
 
 def files(sources: Path) -> dict[str, bytes]:
-    """Pages and the pictures on them, by their names in the package; the README is `index.html`."""
-    pages = {
-        "docs/" + path.name: path.stem + ".html"
-        for path in sorted((sources / "docs").glob("*.md"))
-        if path.stem not in _NOT_IN_IT
-    }
-    pages["README.md"] = "index.html"
+    """Pages and the pictures on them, by their names in the package; the first is that of the shots."""
+    docs = sources / "docs"
+    paths = [path for path in sorted(docs.glob("*.md")) if path.stem not in _NOT_IN_IT]
+    above = {path.relative_to(sources).as_posix(): path.stem + ".html" for path in paths} | {_FIRST: "index.html"}
+    shots = sorted((docs / "shots").glob("*.md"))
+    pages = above | {path.relative_to(sources).as_posix(): f"shots_{path.stem}.html" for path in shots}
     texts = {source: (sources / source).read_text(encoding="utf-8") for source in pages}
     titles = {page: texts[source].splitlines()[0].lstrip("# ") for source, page in pages.items()}
-    titles["index.html"] = "SoftGround"
-    order = sorted(titles, key=lambda page: (page != "index.html", titles[page]))
+    order = sorted(above.values(), key=lambda page: (page != "index.html", titles[page]))
     contents = " · ".join(f'<a href="{page}">{html.escape(titles[page].split(":")[0])}</a>' for page in order)
     built: dict[str, bytes] = {}
     for source, page in pages.items():

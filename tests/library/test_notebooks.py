@@ -46,7 +46,7 @@ def test_forces_of_a_walk_are_near_the_plates_in_twelve_lines(run):
 
 
 def test_a_boot_sinks_less_in_harder_snow_and_about_as_deep_as_boots_do(run):
-    """The medians of docs/ground.md are for 33 kPa: this boot has about as much."""
+    """The medians of docs/ground_law.md are for 33 kPa: this boot has about as much."""
     depths = run("a_boot_in_five_snows")["depths"]
     assert depths == sorted(depths, reverse=True)
     assert depths[0] == pytest.approx(0.5, abs=0.15)

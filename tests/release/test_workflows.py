@@ -15,7 +15,8 @@ WORKFLOWS = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for pat
 JOBS = {(page, name): job for page, workflow in WORKFLOWS.items() for name, job in workflow["jobs"].items()}
 SYSTEMS = {"ubuntu-latest", "windows-latest", "macos-latest"}
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-TESTED = set(re.findall(r"bpy module (\d+\.\d+\.\d+)", README))
+SYSTEMS_PAGE = (ROOT / "docs" / "systems.md").read_text(encoding="utf-8")
+TESTED = set(re.findall(r"bpy module (\d+\.\d+\.\d+)", SYSTEMS_PAGE))
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 TARGETS = set(re.search(r"^\.PHONY: (.*)", MAKEFILE, re.MULTILINE)[1].split())
 
@@ -82,7 +83,7 @@ def test_lint_types_and_core_need_no_blender_and_core_runs_on_every_system():
     assert {cell["matrix.os"] for cell in cells(JOBS["checks", "core"])} == SYSTEMS
 
 
-def test_tests_and_the_installed_zip_run_in_every_blender_of_the_readme():
+def test_tests_and_the_installed_zip_run_in_every_blender_of_the_docs():
     for job in ("tests", "installed"):
         assert {makes(line)[1]["BPY"] for line in commands(("blender", job))} == TESTED
     systems = {(cell["matrix.os"], cell["matrix.blender.bpy"]) for cell in cells(JOBS["blender", "installed"])}
