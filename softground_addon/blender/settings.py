@@ -236,10 +236,7 @@ def character_of(character: Any) -> CharacterSettings:
 
 def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
     """Responses that are asked of the characters, None if nothing."""
-    sunk = (
-        options.sink_feet and options.output == "BOTH" and any(character.armature for character in options.characters)
-    )
-    grounded = grounded or sunk or (options.grounding.use and options.output != "PRINTS")
+    grounded = grounded or sinks_feet(options) or (options.grounding.use and options.output != "PRINTS")
     tilted = options.tilt.use and (grounded or options.output != "PRINTS")
     if not (tilted or grounded):
         return None
@@ -250,6 +247,12 @@ def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
         TiltOptions(gains, typed(tilt.strength), typed(tilt.lateral)) if tilted else None,
         GroundingOptions(typed(grounding.align), typed(grounding.lock), acted) if grounded else None,
     )
+
+
+def sinks_feet(options: Any) -> bool:
+    """True if a bake lowers the feet of characters into their prints."""
+    sinks = options.sink_feet and options.output == "BOTH"
+    return sinks and any(character.armature for character in options.characters)
 
 
 def name_of(obj: bpy.types.Object) -> ObjectName:

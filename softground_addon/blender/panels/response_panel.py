@@ -173,6 +173,7 @@ class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
             layout.label(text=speed, translate=False)
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
+        column.active |= settings.sinks_feet(options)
         column.separator()
         for part in settings.PERFORMANCE:
             column.prop(options.grounding, part)

@@ -20,6 +20,7 @@ from softground_addon.blender.panels import (
     panels,
     preset_icons,
     preset_menu,
+    response_panel,
     steps_panel,
     weather_panel,
 )
@@ -193,6 +194,17 @@ def test_the_panel_warns_before_the_bake_where_steps_will_end_at_the_bottom(shot
     bpy.ops.softground.predict_depth()
     prediction.look_anew()
     assert "Pressed to the bottom, 30 cm" in said()
+
+
+@pytest.mark.parametrize("sinks", [True, False])
+def test_acting_is_offered_where_a_bake_lowers_the_feet(shot, sinks):
+    shot.softground.grounding.use, shot.softground.sink_feet = False, sinks
+    columns = [MagicMock() for _ in range(8)]
+    layout = MagicMock()
+    layout.column.side_effect = columns
+    response_panel.SOFTGROUND_PT_response.draw(SimpleNamespace(fields=lambda: layout), bpy.context)
+    acting = next(column for column in columns if any("knee_lift" in call.args for call in column.prop.call_args_list))
+    assert acting.active is sinks
 
 
 def test_the_selected_mesh_is_the_ground_by_a_button_of_its_own(shot):
