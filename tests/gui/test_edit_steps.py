@@ -4,7 +4,7 @@ import pytest
 
 from tests.pace import at_pace
 
-pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
 
 
 @pytest.fixture

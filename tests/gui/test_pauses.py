@@ -10,7 +10,7 @@ import pytest
 
 from tests.pace import at_pace
 
-pytestmark = [pytest.mark.alone, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.timeout(900)
 
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
