@@ -11,14 +11,14 @@ from sample_scenes.make_all import SCENES
 from tests.scenes import promises
 
 ROOT = Path(__file__).parents[2]
-LONG = ("tyre_and_boot",)
-"""Scenes that bake for minutes."""
+SHORT = ("relief", "dune_runner", "powder_runner", "before_after")
+"""Scenes that bake in seconds."""
 
 
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=pytest.mark.marathon if name in LONG else pytest.mark.slow)
+        pytest.param(name, marks=pytest.mark.slow if name in SHORT else pytest.mark.marathon)
         for name in ("relief", *HEROES)
     ],
 )
