@@ -17,6 +17,7 @@ from softground_addon.core.legs.grounding import leg_soles
 from softground_addon.core.legs.legs import Leg
 from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.record.ground_history import GroundHistory
+from softground_addon.core.response.leaving import leaving_early
 from softground_addon.core.rig.mapping import RigMapping
 from tests.blender import rigs, shots
 
@@ -227,14 +228,16 @@ def gaps_on_the_rig(scene, result, terrain, character=None):
     before = world_matrices(scene, armature, bones, frames)
     character.response_strength = strength
     history = GroundHistory(terrain, result.footprints)
-    found = []
+    touching = np.zeros((len(frames), len(motion.soles)), bool)
     for index, sole in enumerate(motion.soles):
-        carry = now[:, index] @ np.linalg.inv(before[:, index])
-        carried = SoleMotion(sole.sole, carry[:, None] @ sole.transforms)
-        stands = np.zeros(len(frames), bool)
         for step in result.report["steps"]:
             if step["contact"] == sole.sole.name and step["character"] == armature.name:
-                stands |= (frames >= step["frame_start"]) & (frames <= step["frame_end"] - 0.5)  # then it is leaving
+                during = (frames >= step["frame_start"]) & (frames <= step["frame_end"] - 0.5)  # then it is leaving
+                touching[:, index] |= during
+    found = []
+    for index, stands in enumerate(leaving_early(motion, touching, result.footprints).T):
+        sole, carry = motion.soles[index], now[:, index] @ np.linalg.inv(before[:, index])
+        carried = SoleMotion(sole.sole, carry[:, None] @ sole.transforms)
         found.append(lowest_clearance(posed_points(carried)[stands], history, motion.frames[stands]))
     return np.concatenate(found)
 

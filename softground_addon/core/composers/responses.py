@@ -130,7 +130,13 @@ def responses_of(
         standing = leaving_early(motion, touching, left.edited) if options.grounding else touching
         yield
         response = yield from respond.slices(
-            motion, standing, history, tilt=options.tilt, grounding=options.grounding, followed=followed
+            motion,
+            touching,
+            history,
+            tilt=options.tilt,
+            grounding=options.grounding,
+            standing=standing,
+            followed=followed,
         )
         yield
         before = yield from gaps.slices(motion, standing, history)

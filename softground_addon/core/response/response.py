@@ -100,6 +100,7 @@ def respond(
     *,
     tilt: TiltOptions | None,
     grounding: GroundingOptions | None,
+    standing: Mask | None = None,
     followed: Followed | None = None,
 ) -> Slices[Response]:
     """The response to a ground that has been pressed.
@@ -113,6 +114,8 @@ def respond(
     history : GroundHistory
         With all footprints that the ground holds, of all characters.
     tilt, grounding : options, or None to leave that out
+    standing : (F, S) bool array, optional
+        Where grounded soles stand in their prints, if not as long as they touch (`leaving_early`).
     followed : Followed, optional
         Where moved steps take the feet; only with grounding.
     """
@@ -128,6 +131,7 @@ def respond(
         return (yield from settle.slices(motion, unmoved, in_place, leaning))
 
     followed = followed or Followed()
+    standing = touching if standing is None else standing
 
     def place(side: str, heel_rise: Array | None = None, change: Array | None = None) -> Slices[None]:
         yield
@@ -136,7 +140,7 @@ def respond(
         placed = place_sole(
             motion if carry is None else with_sole(motion, sole, moved(motion.soles[sole], carry)),
             sole,
-            touching[:, sole],
+            standing[:, sole],
             history,
             undisturbed,
             align=grounding.align,
@@ -149,14 +153,14 @@ def respond(
     placements: dict[str, tuple[int, Placement]] = {}
     for side in feet:
         yield from place(side)
-    acted, crouch, arms = _acted(motion, touching, placements, grounding.performance)
+    acted, crouch, arms = _acted(motion, standing, placements, grounding.performance)
     for side, change in acted.items():
         yield from place(side, change=change)
-    rises = heel_rises(motion, placements, touching, leaning, crouch=crouch, level=followed.hips)
+    rises = heel_rises(motion, placements, standing, leaning, crouch=crouch, level=followed.hips)
     for side, rise in rises.items():
         if rise.any():
             yield from place(side, rise, acted.get(side))
-    settled = yield from settle.slices(motion, placements, touching, leaning, crouch=crouch, level=followed.hips)
+    settled = yield from settle.slices(motion, placements, standing, leaning, crouch=crouch, level=followed.hips)
     return replace(settled, arms=arms)
 
 
