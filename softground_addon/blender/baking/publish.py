@@ -111,8 +111,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         del lines, points  # they are large, and all is in the table
         yield Progress("write", 0.8)
         marks = _tread(footprints, place.position, made_with, relief)
-        yield Progress("write", 0.85)
-        trampled = yield from _trampled(footprints, made_with)
+        yield Progress("write", 0.9)
         yield from baked_ground.write(
             place,
             sample,
@@ -139,6 +138,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         )  # all is in the mesh, of which Blender makes another
         if is_draft:
             yield Progress("write", 0.9)
+        trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
