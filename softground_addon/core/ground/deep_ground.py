@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..numerics.interpolation import smooth_step
+
 ANKLE = 0.35
 """Height of the ankle, in sole lengths: 10 cm for an adult. Down to it, a step is what it is on shallow ground."""
 WADES = 0.5
@@ -27,5 +29,4 @@ def wading(depth: Any, sole_length: float) -> Any:
     >>> [round(float(wading(depth, 0.28)), 3) for depth in (0.05, 0.098, 0.15, 0.5)]
     [0.0, 0.0, 1.0, 1.0]
     """
-    share = np.clip((np.asarray(depth) / sole_length - ANKLE) / (WADES - ANKLE), 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)
+    return smooth_step((np.asarray(depth) / sole_length - ANKLE) / (WADES - ANKLE))

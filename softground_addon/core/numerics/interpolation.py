@@ -93,6 +93,12 @@ def in_stretches(work: Callable[[slice], Array], count: int) -> Slices[Array]:
     return whole
 
 
+def smooth_step(share: Array) -> Array:
+    """Cubic from 0 at 0 to 1 at 1, level at both ends and outside."""
+    part = np.clip(share, 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))
+
+
 def linear(samples: Array, position: Array) -> Array:
     """Samples (F, ...) along straight lines, at positions (K,), (K, ...)."""
     index, u = _span(len(samples), position)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.interpolation import smooth_step
 from ..record.footprints import Footprint
-from .lattice_noise import noise, rise
+from .lattice_noise import noise
 from .layers import Around
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Drag:
     @property
     def share(self) -> float:
         """Share of a whole mark, from 0 to 1."""
-        return float(rise(np.asarray((self.length - LEAST) / (WHOLE - LEAST))))
+        return float(smooth_step(np.asarray((self.length - LEAST) / (WHOLE - LEAST))))
 
     def spared(self, around: Around) -> Array:
         """Part of a tread that it leaves."""
@@ -73,7 +74,7 @@ class Drag:
     def _within(self, along: Array, across: Array) -> Array:
         """1 on the way, 0 beside it."""
         beside = np.hypot(across, along - np.clip(along, 0.0, self.length))
-        return rise(2.0 - 2.0 * beside / self.radius)
+        return smooth_step(2.0 - 2.0 * beside / self.radius)
 
     def heights(self, around: Around) -> Array:
         """Heights [m]."""
@@ -83,8 +84,10 @@ class Drag:
         to_end = along - length - 1.4 * self.radius
         size = around.length(FINE)
         lines = noise(around.seed + 191, size, across, along / LONG) if size >= around.finest else 0.0 * along
-        ramp = rise(along / length) * (1.0 - around.pressed)
-        before = np.maximum(1.0 - (to_end**2 + across**2) / self.radius**2, 0.0) * rise(to_end / self.radius + 0.5)
+        ramp = smooth_step(along / length) * (1.0 - around.pressed)
+        before = np.maximum(1.0 - (to_end**2 + across**2) / self.radius**2, 0.0) * smooth_step(
+            to_end / self.radius + 0.5
+        )
         heights = within * (SCRATCH * lines - RAMP * ramp) + HEAP * before * (1.0 - around.pressed)
         return np.asarray(self.share * self.depth * heights)
 

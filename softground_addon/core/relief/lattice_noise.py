@@ -47,14 +47,8 @@ def uniform(seed: int, *lattice: Whole) -> Array:
     return np.asarray(hashed(seed, *lattice) * 2.0**-32)
 
 
-def rise(share: Array) -> Array:
-    """Smooth step from 0 at 0 to 1 at 1, level at both ends and outside."""
-    part = np.clip(share, 0.0, 1.0)
-    return np.asarray(part * part * (3.0 - 2.0 * part))
-
-
 def _passage(share: Array) -> Array:
-    """The same with ends that do not bend either (Perlin 2002, doi:10.1145/566654.566636, eq. 1)."""
+    """Smooth step from 0 to 1 whose ends do not bend either (Perlin 2002, doi:10.1145/566654.566636, eq. 1)."""
     return np.asarray(share * share * share * (share * (share * 6.0 - 15.0) + 10.0))
 
 

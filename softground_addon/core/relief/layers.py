@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lattice_noise import Cells, cells, fractal, noise, rise, uniform
+from ..numerics.interpolation import smooth_step
+from .lattice_noise import Cells, cells, fractal, noise, uniform
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ class Around:
 
     def patches(self, number: int, size: float, share: float = 0.5) -> Array:
         """0 and 1 in patches of a size [mm], with soft borders; 1 over about a share of the ground."""
-        return rise((self.noise(number, size) + 2.2 * (share - 0.5)) * 2.0 + 0.5)
+        return smooth_step((self.noise(number, size) + 2.2 * (share - 0.5)) * 2.0 + 0.5)
 
     def across(self, number: int, size: float, stretch: float) -> Array:
         """Noise of a size along the outline [mm], so many times longer across it."""
@@ -109,7 +110,7 @@ class Lumps:
 
     def heights(self, around: Around) -> Array:
         """Heights [m]."""
-        zone = rise(1.0 + around.inward / around.length(self.reach)) * (1.0 - around.pressed)
+        zone = smooth_step(1.0 + around.inward / around.length(self.reach)) * (1.0 - around.pressed)
         bumps = np.maximum(around.noise(111, self.size), 0.0) + 0.35 * np.maximum(around.noise(112, self.size / 2), 0.0)
         return bumps * zone * around.length(self.height) / 1.8
 
@@ -172,7 +173,7 @@ class Fans:
     def heights(self, around: Around) -> Array:
         """Heights [m]."""
         share = around.inward / around.length(self.reach)
-        body = rise(3.0 * share) * rise(2.0 - 2.0 * share)
+        body = smooth_step(3.0 * share) * smooth_step(2.0 - 2.0 * share)
         return np.maximum(around.across(151, self.width, 4.0), 0.0) * body * around.length(self.height)
 
 
@@ -209,7 +210,7 @@ class Cracks:
         """Heights [m]."""
         size = around.length(self.size)
         out = np.maximum(-around.inward, 0.0) / around.length(self.reach)
-        zone = np.maximum(1.0 - 0.35 * out * out, 0.0) ** 2 * rise(1.3 - 0.4 * out)
+        zone = np.maximum(1.0 - 0.35 * out * out, 0.0) ** 2 * smooth_step(1.3 - 0.4 * out)
         zone = zone * around.patches(171, self.patches, 0.62) * (1.0 - around.pressed)
         x, y = (
             place + sum(amount * MM * around.noise(number + 2 * octave, scale) for octave, scale, amount in _BENT)
@@ -248,7 +249,7 @@ class Fissures:
         width = self.width * MM * (1.0 - 0.7 * np.clip(out, 0.0, 1.0))
         shown = np.maximum(width, 0.55 * around.finest)
         open_ = np.maximum(1.0 - (lines / shown) ** 2, 0.0) ** 2 * np.sqrt(width / shown)
-        zone = rise(2.0 - 2.0 * out) * (1.0 - around.pressed) * around.patches(203, self.patches)
+        zone = smooth_step(2.0 - 2.0 * out) * (1.0 - around.pressed) * around.patches(203, self.patches)
         return -open_ * zone * around.length(self.depth)
 
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.interpolation import smooth_step
 from ..record.footprints import Footprint
 from .amounts import Amounts, Chunks
 from .drag import Drag, drags_of
-from .lattice_noise import cells, noise, rise, uniform
+from .lattice_noise import cells, noise, uniform
 from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
 from .scattered_crumbs import ScatteredCrumbs, scattered
@@ -197,11 +198,11 @@ class PrintRelief:
         """Change of height and compression by the broken wall, and share of pressing; the wall is `wider` [m]."""
         wall = self._amounts.wall * MM * self._shape.fineness
         if wall:
-            pressed = rise((places.inward + wider) / wall + 0.5)
-            pressed = rise((places.inward + wider + self._ledges(places, places.floor * pressed)) / wall + 0.5)
+            pressed = smooth_step((places.inward + wider) / wall + 0.5)
+            pressed = smooth_step((places.inward + wider + self._ledges(places, places.floor * pressed)) / wall + 0.5)
             compression, rim = places.floor * pressed, places.continued * (1.0 - pressed)
         else:
-            pressed = rise(places.inward / (2.0 * self._shape.cell_size) + 0.5)
+            pressed = smooth_step(places.inward / (2.0 * self._shape.cell_size) + 0.5)
             compression, rim = places.bent_compression, places.bent_rim
         deeper = (compression - places.compression) * places.fade
         return (rim - places.rim) * places.fade - deeper, deeper, pressed
@@ -258,7 +259,7 @@ class PrintRelief:
             return ridges * around.pressed * height * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
         lost = tread.kept + (tread.lost - tread.kept) * worn * worn
-        within = rise((around.inward - around.length(3.0)) / around.length(6.0))
+        within = smooth_step((around.inward - around.length(3.0)) / around.length(6.0))
         return ridges * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .lattice_noise import rise
+from ..numerics.interpolation import smooth_step
 from .tread_map import height_at
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ EDGE = 0.0011
 
 def _band(distance: Array, half_width: float) -> Array:
     """1 within a band around 0, 0 outside."""
-    return rise((half_width - np.abs(distance)) / EDGE * 0.5 + 0.5)
+    return smooth_step((half_width - np.abs(distance)) / EDGE * 0.5 + 0.5)
 
 
 def _from_line(phase: Array, pitch: float) -> Array:
@@ -99,7 +99,7 @@ def bare(under: Under) -> Array:
         width = min(_FLESH, 0.4 * half_length * LENGTH)  # toes stay apart
         both = np.maximum(1.0 - np.abs(far - pad) / width, 0.0)
         far = np.maximum(far, pad) + 0.25 * width * both * both
-    return np.asarray(1.0 - rise(far / _FLESH + 0.5))
+    return np.asarray(1.0 - smooth_step(far / _FLESH + 0.5))
 
 
 PATTERNS: Mapping[str, Pattern] = {"HIKING": hiking, "TRAINER": trainer, "BARE": bare}
