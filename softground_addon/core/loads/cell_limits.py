@@ -31,16 +31,16 @@ CELLS_AT_ONCE, STEPS_AT_ONCE = 4e6, 128
 SECONDS_PER_CELL_LAID_OUT = 7e-8
 """What a cell around a sole takes in each step of the simulation [s]: 40 to 110 ns, standing or walking, ..."""
 
-SECONDS_PER_CELL = 5e-6
+SECONDS_PER_CELL = 1.5e-5
 """... what a cell that changes takes [s], ..."""
 
-SECONDS_PER_VERTEX = 3.7e-5
+SECONDS_PER_VERTEX = 1.5e-5
 """... and what a vertex takes to write [s], and over the square of their distance ..."""
 
 SECONDS_OF_FINE_VERTICES = 1.5e-11
 """... [s m²], as the display blur reaches over more of them."""
 
-BYTES_AT_LEAST, SECONDS_AT_LEAST = 10e6, 0.5
+BYTES_AT_LEAST, SECONDS_AT_LEAST = 10e6, 0.8
 """What a bake of any size takes: [bytes] and [s]."""
 
 LARGEST_SPREAD = 4.0
