@@ -6,6 +6,7 @@ knew last.
 
 from __future__ import annotations
 
+import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -106,12 +107,17 @@ def shown_cm(scene: bpy.types.Scene) -> float:
 
 
 def type_cm(scene: bpy.types.Scene, depth: float) -> None:
-    """Set the stiffness so that the typical print gets a depth [cm]; says why where none gives it."""
-    known = analysis.current(scene)
-    if known is None or not depth > 0:
+    """Set the stiffness so that the typical print gets a depth [cm]; says why where none gives it.
+
+    Scripts without a window may set it before the shot was read, which is done then.
+    """
+    if not depth > 0:
         return
-    wanted = settings.snapshot(scene)
     try:
+        known = analysis.read(scene) if bpy.app.background else analysis.current(scene)
+        if known is None:
+            return
+        wanted = settings.snapshot(scene)
         if bpy.app.background or depth / 100 > wanted.material.deepest or not state.told.get(scene.session_uid):
             modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
             scene.softground.material.youngs_modulus = modulus
@@ -119,7 +125,9 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
             aim_at(scene, depth / 100)
     except InputError as error:
         message = str(error)
-        if not bpy.app.background:
+        if bpy.app.background:
+            print(f"Depth: {message}", file=sys.stderr)
+        else:
             bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
 
 

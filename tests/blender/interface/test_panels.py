@@ -166,20 +166,27 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
     assert shot.softground.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(expected, rel=0.02)
 
 
-def test_a_depth_that_is_typed_is_that_of_a_bake(shot):
+def test_a_depth_that_is_typed_is_that_of_a_bake(shot, capsys):
     options = shot.softground
-    options.depth_cm = 5.0
-    assert options.depth_cm == 0.0, "nothing is known of the shot yet"
-    bpy.ops.softground.predict_depth()
-    assert prediction.of(shot) is not None
+    assert prediction.of(shot) is None
     stiffness = options.material.youngs_modulus
     options.depth_cm = 5.0
-    assert options.material.youngs_modulus != stiffness
+    assert options.material.youngs_modulus != stiffness, "a script need not have the shot read first"
+    assert prediction.of(shot) is not None
     bpy.ops.softground.bake()
     assert options.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(0.05, rel=0.02)
     stiffness = options.material.youngs_modulus
     options.depth_cm = 1e5
     assert options.material.youngs_modulus == stiffness, "no ground gives that"
+    assert "Depth: " in capsys.readouterr().err
+
+
+def test_a_depth_that_a_script_types_for_a_shot_that_cannot_be_read_says_why(shot, capsys):
+    stiffness = shot.softground.material.youngs_modulus
+    shot.softground.frame_start, shot.softground.frame_end = 10, 5
+    shot.softground.depth_cm = 5.0
+    assert "frame" in capsys.readouterr().err.lower()
+    assert shot.softground.material.youngs_modulus == stiffness
 
 
 def test_the_panel_warns_before_the_bake_where_steps_will_end_at_the_bottom(shot):
