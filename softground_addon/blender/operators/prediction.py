@@ -6,7 +6,6 @@ knew last.
 
 from __future__ import annotations
 
-import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -124,11 +123,10 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
         else:
             aim_at(scene, depth / 100)
     except InputError as error:
-        message = str(error)
         if bpy.app.background:
-            print(f"Depth: {message}", file=sys.stderr)
-        else:
-            bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
+            raise  # Blender writes it to the console
+        message = str(error)
+        bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
 
 
 def aim_at(scene: bpy.types.Scene, depth: float) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
+from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
@@ -301,8 +302,7 @@ def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
     extra = np.zeros(len(missing))
     wanted = upper_envelope(np.where(touching | ~np.isfinite(missing), 0.0, np.maximum(missing, 0.0)), reach)
     distance = _frames_from_contact(touching)
-    fade = np.clip(distance / (reach + 1), 0.0, 1.0)
-    extra[~touching] = (wanted * fade * fade * (3 - 2 * fade))[~touching]
+    extra[~touching] = (wanted * smooth_step(distance / (reach + 1)))[~touching]
     return extra
 
 
