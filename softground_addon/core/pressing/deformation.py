@@ -74,7 +74,9 @@ def target_compression(
     return np.asarray(strain(load, material) * (material.layer_depth * depth))
 
 
-def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, landing_speed: Any = 0.0) -> Any:
+def compression_rate(
+    step: Any, material: GroundMaterial, target: Any = 0.0, landing_speed: Any = 0.0, plate: Plate | None = None
+) -> Any:
     """Fraction of the target by which the ground gives way in a step (Eq. 11).
 
     Parameters
@@ -86,12 +88,14 @@ def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, lan
         Compression that the stress leads to [m].
     landing_speed : float or float array
         Speed into the ground at which the sole landed [m/s]; with a `shortest_time`, it sets the pace.
+    plate : Plate, optional
+        What the sole is in deep ground.
     """
-    if not (material.shortest_time and np.any(landing_speed)):
-        return step / material.characteristic_time
-    shortest = min(material.shortest_time, material.characteristic_time)
-    time = np.minimum(np.maximum(2.0 * target / landing_speed, shortest), material.characteristic_time)
-    return step / time
+    time: Any = material.characteristic_time
+    if material.shortest_time and np.any(landing_speed):
+        shortest = min(material.shortest_time, time)
+        time = np.minimum(np.maximum(2.0 * target / landing_speed, shortest), time)
+    return step / (plate.fall_time(time) if plate else time)
 
 
 def sink(
@@ -143,9 +147,7 @@ def sink(
     """
     steps = len(force)
     bearing_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
-    rate = compression_rate(step, material)
-    if plate:
-        rate = plate.rate(rate, step)
+    rate = compression_rate(step, material, plate=plate)
     layer, modulus = material.layer_depth, material.youngs_modulus * firmness
     # Rounded as it always was where the ground is the paper's, so that old shots bake to the same bytes.
     per_pascal = layer / modulus if material.exponent == 1.0 and not material.firm_depth else 0.0
@@ -165,8 +167,7 @@ def sink(
             if plate:
                 target[k] = plate.depth(target[k])
             if follows_landing:
-                rate = compression_rate(step, material, target[k], landing_speed)
-                rate = plate.rate(rate, step) if plate else rate
+                rate = compression_rate(step, material, target[k], landing_speed, plate)
             if sinkage > 0 or stress >= material.crust_stress:
                 sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
         reached[k + 1] = sinkage

@@ -43,10 +43,9 @@ class Plate:
         """Area that bears the force [m²], while so much of it touches."""
         return 1.0 / ((1.0 - self.share) / touching + self.share / self.area)
 
-    def rate(self, rate: Any, step: float) -> Any:
-        """Fraction of the target by which the ground gives way in a step [s], at least as fast as in `FALL_TIME`."""
-        time = step / rate
-        return step / (time + self.share * (np.minimum(time, FALL_TIME) - time))
+    def fall_time(self, time: Any) -> Any:
+        """Time in which the ground gives way [s], from that on shallow ground; at most `FALL_TIME` where it is deep."""
+        return time + self.share * (np.minimum(time, FALL_TIME) - time)
 
     def depth(self, target: Any) -> Any:
         """Compression that a stress leads to, from that which it would lead to if it lasted [m]."""

@@ -96,9 +96,7 @@ class SoleLayout(ContactLayout):
         contact = in_contact(coverage)
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
         rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
-        rate = compression_rate(step, material, sinking.target, landing_speed)
-        if plate:
-            rate = plate.rate(rate, step)
+        rate = compression_rate(step, material, sinking.target, landing_speed, plate)
         stress = self._stress(steps, window, cells, sinking, area * fraction, plate)
         if factors and stress.ndim == 1:
             stress = stress[:, None, None]

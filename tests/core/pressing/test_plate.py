@@ -13,6 +13,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.pressing import contact_layout
+from softground_addon.core.pressing.deformation import compression_rate
 from softground_addon.core.pressing.plate import FALL_TIME, STIFF, Plate
 from tests.core.ground.test_variation import Bands
 from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk
@@ -123,12 +124,14 @@ def test_a_lasting_load_brings_a_sole_down_evenly_in_the_fall_time():
         np.testing.assert_allclose(compression, expected, rtol=2e-3)
 
 
-@pytest.mark.parametrize(("share", "bearing", "rate"), [(0.0, 0.004, 0.05), (1.0, 0.02, 0.01 / FALL_TIME)])
-def test_a_plate_bears_with_what_touches_or_with_all_of_the_sole(share, bearing, rate):
+@pytest.mark.parametrize(("share", "bearing", "time"), [(0.0, 0.004, 0.2), (1.0, 0.02, FALL_TIME)])
+def test_a_plate_bears_with_what_touches_or_with_all_of_the_sole(share, bearing, time):
     plate = Plate(share, 0.02)
     assert plate.bearing(0.004) == pytest.approx(bearing)
-    assert plate.rate(0.05, 0.01) == pytest.approx(rate)
-    assert plate.rate(0.5, 0.01) == pytest.approx(0.5), "never slower than the ground"
+    assert plate.fall_time(0.2) == pytest.approx(time)
+    assert plate.fall_time(0.02) == pytest.approx(0.02), "never slower than the ground"
+    material = replace(DEEP, characteristic_time=0.2, shortest_time=0.0)
+    assert compression_rate(0.01, material, plate=plate) == pytest.approx(0.01 / time)
 
 
 def test_a_plate_takes_no_pressure_away_and_leaves_none_far_below_the_highest():
