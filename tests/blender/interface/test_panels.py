@@ -185,7 +185,7 @@ def test_a_depth_that_a_script_types_for_a_shot_that_cannot_be_read_says_why(sho
     stiffness = shot.softground.material.youngs_modulus
     shot.softground.frame_start, shot.softground.frame_end = 10, 5
     shot.softground.depth_cm = 5.0
-    assert "frame" in capsys.readouterr().err.lower()
+    assert "InputError: The frame range" in capsys.readouterr().err
     assert shot.softground.material.youngs_modulus == stiffness
 
 
