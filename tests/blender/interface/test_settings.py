@@ -22,7 +22,6 @@ NO_INPUT = {
     "cells_along_sole": "sets the cell size",
     "characters.sole_length": "sets the cell size",
     "length_scale": "sets the rim's reach and the smoothing",
-    "depth_cm": "sets the stiffness",
     "snow_cm": "sets the weather",
     "weather_hours": "sets the weather",
     "grounding.by_button": "what Clear Bake switches off again",
@@ -112,7 +111,7 @@ def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot)
             if settings.snapshot(shot) != before:
                 changing.add(path + name)
             setattr(owner, name, value)
-            if name in {surface.control for surface in SURFACES.values()}:  # each sets several fields
+            if name in {"depth_cm", *(surface.control for surface in SURFACES.values())}:  # they set the material
                 for field, number in vars(before.material).items():
                     setattr(shot.softground.material, field, number)
             assert settings.snapshot(shot) == before, path + name
