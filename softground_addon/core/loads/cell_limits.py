@@ -40,7 +40,7 @@ SECONDS_PER_VERTEX = 1.5e-5
 SECONDS_OF_FINE_VERTICES = 1.5e-11
 """... [s m²], as the display blur reaches over more of them."""
 
-BYTES_AT_LEAST, SECONDS_AT_LEAST = 10e6, 0.8
+BYTES_AT_LEAST, SECONDS_AT_LEAST = 10e6, 0.6
 """What a bake of any size takes: [bytes] and [s]."""
 
 LARGEST_SPREAD = 4.0

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from statistics import median
 
 import bpy
 import pytest
@@ -34,6 +35,11 @@ def taken(case, **environment):
     return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("RESULT")).partition(" ")[2])
 
 
+def ratio_of_times(case):
+    estimated, measured = taken(case)["time"]
+    return estimated / measured
+
+
 @pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read as on Linux")
 @pytest.mark.parametrize(
@@ -45,11 +51,12 @@ def taken(case, **environment):
     ids=lambda case: "-".join(f"{value:g}" for value in case),
 )
 def test_the_estimate_is_within_a_factor_of_two(case):
-    for what, (estimated, measured) in (
-        ("time", taken(case)["time"]),
-        ("memory", taken(case, **RETURNED)["memory"]),
-    ):
-        assert 0.5 < estimated / measured < 2, (what, estimated, measured)
+    estimated, measured = taken(case, **RETURNED)["memory"]
+    assert 0.5 < estimated / measured < 2, (estimated, measured)
+    ratios = [ratio_of_times(case)]
+    if not 0.5 < ratios[0] < 2:  # the pace of a shared machine changes within a bake: the middle one of three counts
+        ratios += [ratio_of_times(case), ratio_of_times(case)]
+    assert 0.5 < median(ratios) < 2, ratios
 
 
 def test_a_bake_of_a_beetle_that_would_take_hours_is_refused_with_a_size_that_does_not(addon, capfd):

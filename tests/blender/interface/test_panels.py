@@ -233,7 +233,7 @@ def test_the_cells_to_expect_are_those_that_a_bake_prints(shot):
     assert known.coverage.area / shot.softground.cell_size**2 == pytest.approx(printed, rel=0.3)
     coverage = Coverage(0.4, 0.0, np.zeros((0, 2)), np.zeros(0, int))
     assert ground_options_panel.estimate(coverage, Fineness(0.01, 0.04)) == "About 4,000 cells, 14 MB, 1 seconds"
-    assert ground_options_panel.estimate(coverage, Fineness(0.002, 0.04)) == "About 100,000 cells, 100 MB, 5 seconds"
+    assert ground_options_panel.estimate(coverage, Fineness(0.002, 0.04)) == "About 100,000 cells, 100 MB, 4 seconds"
     close = Fineness(0.01, 0.04, "CLOSE_UP", 2_000_000)
     assert ground_options_panel.estimate(coverage, close) == "About 4,000 cells, 68 MB, 2 seconds"
     assert ground_options_panel.vertices(192_000, 2_000_000) == "About 190,000 vertices along the whole trail"
