@@ -1,7 +1,7 @@
 """The film of soft ground on a sole: taken up as the sole leaves the ground, left on hard floors step by step.
 
-Masses are per area of the sole [kg/m²], by `ZONES`. Equal steps on a hard floor, of which each leaves the share q of the
-film, leave it as a geometric series: film·(1 - q)^n after n of them.
+Masses are per area of the sole [kg/m²], by `ZONES`. Equal steps on a hard floor, of which each leaves the share q of
+the film, leave it as a geometric series: film·(1 - q)^n after n of them.
 """
 
 from __future__ import annotations

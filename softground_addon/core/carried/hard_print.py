@@ -20,7 +20,7 @@ Indices = NDArray[np.intp]
 ALONG_SOLE = 20
 """Nodes of the grid along a sole: 1.4 cm for an adult. The outline between them is that of the distances to it."""
 BEDDING = 1e7
-"""Stiffness of a sole [Pa/m]: 2 cm of midsole of 0.2 MPa, which gives 4 mm under a person; errors of a pose are less."""
+"""Stiffness of a sole [Pa/m]: 2 cm of midsole of 0.2 MPa. It gives 4 mm under a person, which forgives poses."""
 CLEARANCE = 0.3e-3
 """Height of a mark over its floor [m]."""
 STEEPEST = 1.0
@@ -164,7 +164,8 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
     # Where it is pressed most it lies; what is not pressed goes with the rest of the sole.
     weight = pressure + 1e-3 * pressure.mean(axis=1, keepdims=True) + 1e-9
     position = (weight[..., None] * places).sum(axis=0) / weight.sum(axis=0)[:, None]
-    position[:, 2] = _floor(terrain, *position[:, :2].T, position[:, 2] + tolerance) + CLEARANCE
+    x, y, z = position.T
+    position[:, 2] = _floor(terrain, x, y, z + tolerance) + CLEARANCE
     largest = pressure.max(axis=0)
     height = position[grid.faces, 2]
     is_even = np.ptp(height, axis=1) <= STEEPEST * grid.spacing  # false where a corner has no floor

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +49,8 @@ class Marks:
         [Pa]
     sole : (V, 3) float array
         As of `SoleGrid` [m].
+    tread : (V,) float array
+        Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
     carried : CarriedMass
@@ -59,6 +63,7 @@ class Marks:
     area: Array
     pressure: Array
     sole: Array
+    tread: Array
     step: NDArray[np.intp]
     carried: CarriedMass = field(default_factory=CarriedMass)
 
@@ -68,6 +73,7 @@ class _Contact:
     """A contact of a sole with a hard floor: as it meets it, where it lies, and its frames."""
 
     meeting: Meeting
+    of_zones: Array
     laid: HardPrint
     shares: Array
     frames: Array
@@ -80,7 +86,8 @@ def marks_of(
     terrain: Terrain,
     *,
     surface: str,
-    shed: Mapping[int, float] | None = None,
+    shed: Mapping[int, float] = MappingProxyType({}),
+    treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or the ground does not stick.
 
@@ -93,6 +100,8 @@ def marks_of(
     surface : str
     shed : mapping of int to float, optional
         Mass that each step sheds in the air, by its number [kg].
+    treads : mapping of (str, str) to float, optional
+        Depth of the grooves of soles that have some, by character and sole [m].
     """
     carried = surfaces.find(surface).carried
     if carried is None or not isinstance(terrain, HardOnSoft):
@@ -104,7 +113,7 @@ def marks_of(
             yield
             if motion.sole.prop is not None:
                 continue
-            soft = list(_soft_meetings(character, index, steps, shed or {}))
+            soft = list(_soft_meetings(character, index, steps, shed))
             hard = character.contacts.hard
             if not soft or hard is None or not hard[:, index].any():
                 continue
@@ -119,8 +128,9 @@ def marks_of(
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
             for contact in contacts:
                 film = given[id(contact.meeting)]
-                if (film * contact.meeting.shares > 0).any():
-                    parts.append(_mark(grid, contact, film, count))
+                if (film * contact.of_zones > 0).any():
+                    depth = treads.get((character.motion.name, motion.sole.name), 0.0)
+                    parts.append(_mark(grid, contact, film, count, depth))
                     count += 1
     return _joined(parts, booked)
 
@@ -158,14 +168,14 @@ def _contact(
     shares = share_left(print_.pressure, carried, slid)
     of_zones = _by_zone(grid, shares * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
     frames = motion.frames[steps]
-    return _Contact(Meeting(float(frames[0]), of_zones), print_, shares, frames)
+    return _Contact(Meeting(float(frames[0]), of_zones), of_zones, print_, shares, frames)
 
 
 def _by_zone(grid: SoleGrid, values: Array) -> Array:
-    return np.bincount(grid.zone, values, len(ZONES))
+    return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int) -> Marks:
+def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int, tread: float) -> Marks:
     """The mark of one contact that takes its shares of a film (4,) [kg/m²]."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
     return Marks(
@@ -176,15 +186,16 @@ def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int) -> Marks:
         grid.area[used],
         contact.laid.pressure[used],
         grid.sole[used],
+        np.full(len(used), tread),
         np.full(len(used), number),
     )
 
 
 def _joined(parts: Sequence[Marks], carried: CarriedMass) -> Marks:
     first = np.cumsum([0, *(len(part.position) for part in parts)])
-    nothing = np.zeros(0)
-    none = Marks(np.zeros((0, 3)), np.zeros((0, 4), int), *[nothing] * 4, np.zeros((0, 3)), np.zeros(0, int))
-    names = ("position", "birth", "mass", "area", "pressure", "sole", "step")
-    whole = {name: np.concatenate([getattr(part, name) for part in (none, *parts)]) for name in names}
+    none, places, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.intp)
+    nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, none, places, none, numbers)
+    names = ("position", "birth", "mass", "area", "pressure", "sole", "tread", "step")
+    whole: Any = {name: np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names}
     faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
-    return Marks(faces=np.concatenate([none.faces, *faces]), **whole, carried=carried)
+    return Marks(faces=np.concatenate([nothing.faces, *faces]), **whole, carried=carried)
