@@ -11,10 +11,14 @@ from ..compat import shader_tree
 from ..shader_graph import Graph, Socket
 from . import marks_nodes as nodes
 
-COVERED = 0.12
+COVERED = 0.16
 """Part of the thickest film on a sole that covers a floor under the parts of the sole that press."""
 LUGS, SLANT, GROOVES = 0.019, 0.6, (0.20, 0.30)
 """Pitch of the lugs of a shoe [m], how far they run back to the sides, and where in each a groove begins."""
+WARP = 0.012
+"""How far lumps bend the edges of lugs, over the size of the noise [m]."""
+SMEAR = 0.4
+"""How much of the floor a smear between lumps covers."""
 DRY_SHADE = 2.6
 """How much paler mud is when it is dry."""
 CLODS = 3e-3
@@ -48,15 +52,16 @@ def _amount(graph: Graph, surface: SurfaceRecord) -> tuple[Socket, Socket]:
     sole = graph.node("ShaderNodeAttribute", attribute_name=nodes.SOLE)
     separate = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(sole, 1)})
     along, across, distance = (graph.out(separate, axis) for axis in range(3))
+    coarse, fine = graph.swing(place, 0.022, 4.0, 0.65), graph.swing(place, 0.004, 3.0, 0.6)
     aside = graph.math("ABSOLUTE", across, 0.0)
-    phase = graph.math("FRACT", (along + aside * SLANT) * (1.0 / LUGS), 0.0)
+    phase = graph.math("FRACT", (along + aside * SLANT + coarse * WARP) * (1.0 / LUGS), 0.0)
     groove = graph.math("ABSOLUTE", phase + -0.5, 0.0)
     is_shod = graph.math("GREATER_THAN", graph.attribute(nodes.TREAD), 0.0)
-    lug = graph.blend(is_shod, 1.0, graph.ramp(groove, *GROOVES, 1.0, 0.12))
+    lug = graph.blend(is_shod, 0.8, graph.ramp(groove, *GROOVES, 1.0, 0.25))
     full = graph.attribute(nodes.MASS) * (1.0 / (COVERED * surface.carried.most))
-    coarse, fine = graph.swing(place, 0.022, 4.0, 0.65), graph.swing(place, 0.004, 3.0, 0.6)
-    amount = full * lug + (coarse * 1.1 + fine * 0.5) * graph.ramp(full, 0.0, 0.3)
-    ragged = distance + coarse * 0.007 + fine * 0.003
+    patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.55, 1.3)
+    amount = full * lug * patches + (coarse * 1.7 + fine * 0.9) * graph.ramp(full, 0.0, 0.5)
+    ragged = distance + coarse * 0.010 + fine * 0.004
     return amount, graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
 
 
@@ -64,11 +69,13 @@ def _earth(graph: Graph, surface: SurfaceRecord, amount: Socket, edge: Socket, w
     """Mud or sand: wet it is dark and shines, dry it is pale and has flaked off where it was thin."""
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
     flaked = graph.blend(wet, 0.12, 0.0)
-    alpha = graph.ramp(graph.math("SUBTRACT", amount, flaked), 0.10, 0.38) * edge
+    solid = graph.ramp(graph.math("SUBTRACT", amount, flaked), 0.18, 0.45) * edge
+    smeared = graph.ramp(graph.math("SUBTRACT", amount, flaked), -0.25, 0.4) * edge * SMEAR
+    alpha = graph.math("MAXIMUM", solid, smeared)
     pale: Any = tuple(min(1.0, part * DRY_SHADE) for part in surface.colour)
     uneven = graph.swing(place, 0.012, 3.0) * 0.5
     colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), pale, surface.colour)
-    height = alpha * graph.ramp(amount, 0.2, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * CLODS)
+    height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * CLODS)
     inputs = {
         "Base Color": colour,
         "Roughness": graph.blend(wet, 0.92, 0.34) + uneven * 0.3,
