@@ -82,7 +82,7 @@ def shoot(built: MuddyBoots, folder: Path, samples: int) -> list[Path]:
     first = np.array([value.value for value in marks.data.attributes["step"].data]) == 0
     middle = place[first].mean(axis=0)
     stage.hide(hiker)
-    near = open_air.add_camera(scene, middle + (0.15, 0.25, 0.42), middle, 45.0, middle, 16.0)
+    near = open_air.add_camera(scene, middle + np.array((0.15, 0.25, 0.42)), middle, 45.0, middle, 16.0)
     close = folder / "muddy_boots_close.jpg"
     stage.render(scene, near, close, PICTURE, samples)
     return [whole, close]

@@ -12,6 +12,7 @@ from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.output import exports
 from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
@@ -170,15 +171,15 @@ def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(ope
         ground = scene.softground.ground
         inputs = dict(result.report["inputs"])
         assert inputs.pop("marks", True) == marks
-        found[name] = (
+        found[marks, hard] = (
             record.dump(record.BakeRecord(list(result.footprints), {})),
             heights(ground).tobytes(),
             {key: value for key, value in result.report["totals"].items() if key != "carried_kg"},
             inputs,
         )
         assert (marks_object.of(ground) is not None) == (marks and hard)
-    assert found["on"] == found["off"]
-    assert found["on, no floor"] == found["off, none"]
+    assert found[True, True] == found[False, True]
+    assert found[True, False] == found[False, False]
 
 
 def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
@@ -193,3 +194,24 @@ def test_marks_stay_while_steps_on_the_ground_are_edited(scene):
     editing = step_edits.editable(scene)
     step_edits.edit(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)})
     assert mesh_arrays.positions(marks_object.of(ground).data).tobytes() == before
+
+
+@pytest.mark.parametrize(
+    ("suffix", "write", "read"),
+    [
+        ("abc", exports.export_alembic, lambda path: bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)),
+        ("usdc", exports.export_usd, lambda path: bpy.ops.wm.usd_import(filepath=path)),
+    ],
+)
+def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, suffix, write, read):
+    ground = scene.softground.ground
+    counts = {frame: len(at(scene, frame).vertices) for frame in (60, 84)}
+    path = tmp_path / f"shot.{suffix}"
+    write(scene, ground, path, 58, 84)
+    known = set(bpy.data.objects)
+    read(str(path))
+    found = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]
+    assert len(found) == 1
+    for frame, count in counts.items():
+        scene.frame_set(frame)
+        assert len(shown(found[0]).vertices) == count
