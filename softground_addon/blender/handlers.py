@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
 from . import session, tread_images
+from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
 from .ground import baked_ground
@@ -68,7 +69,8 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
 def _follow_deletion(scene: Any) -> None:
     ground = scene.softground.ground
     if ground is not None and not live.is_on():
-        debris_object.follow(ground, is_deleted=baked_ground.is_deleted(ground))
+        for belongs in (debris_object.BELONGS, marks_object.BELONGS):
+            belongs.follow(ground, is_deleted=baked_ground.is_deleted(ground))
 
 
 def _follow_weather_keys(scene: Any) -> None:

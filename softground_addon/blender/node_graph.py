@@ -106,6 +106,13 @@ class NodeGraph:
 
         return self._once(name, kind, make=make)
 
+    def without(self, geometry: Any, selection: Any) -> Any:
+        """The geometry without the selected vertices."""
+        node = self.node("GeometryNodeDeleteGeometry", domain="POINT")
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        return node.outputs["Geometry"]
+
     def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
         """Put the selected vertices elsewhere."""
         node = self.node("GeometryNodeSetPosition")

@@ -177,6 +177,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
+        marks=options.marks,
     )
 
 

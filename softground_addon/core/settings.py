@@ -154,6 +154,8 @@ class BakeSettings(SceneUnits):
         The scene's, where a ground is to be made; None without one.
     hard_grounds : tuple of ObjectName
         Objects that soles stand on without a print.
+    marks : bool
+        Whether soles leave on hard ground what sticks to them.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -188,6 +190,7 @@ class BakeSettings(SceneUnits):
     weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
+    marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
 
     @property
     def spacing_m(self) -> float:

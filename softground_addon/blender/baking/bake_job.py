@@ -35,6 +35,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.settings import Acts, BakeSettings
 from .. import settings
+from ..carried import marks_object
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
@@ -45,7 +46,7 @@ from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
 from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
-from .publish import Published, at_the_end, publish, sign, with_debris
+from .publish import Published, at_the_end, marks_left, publish, sign, with_debris
 from .scene_findings import scene_findings
 
 Array = NDArray[np.float64]
@@ -113,6 +114,8 @@ def bake(
     pressed = yield from counted(pressing, "simulate", frames)
     throwing = with_debris.slices(pressed.left, ground, wanted, pressed.loads)
     left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
+    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
+    marks = yield from meanwhile(Progress("simulate", 1.0), marking)
     footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
@@ -148,17 +151,19 @@ def bake(
         worst_gaps=worst_gaps(pressed.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
         events=as_edited(happened, left.steps),
+        carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
     layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del pressed, pressing, throwing, measuring, checking
+    del pressed, pressing, throwing, marking, measuring, checking
     published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
         findings += of_ground
+        marks_object.put(published.ground, marks, surface=wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()

@@ -10,9 +10,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carried.marks import Marks, marks_of
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
-from ...core.debris.debris import Debris
+from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
+from ...core.ground import surfaces
+from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.loads.estimate import CharacterLoads
 from ...core.numerics.slices import Slices, sliced
@@ -71,6 +74,31 @@ def with_debris(
         loads=loads,
     )
     return (yield from throwing)
+
+
+@sliced
+def marks_left(
+    left: record.BakeRecord,
+    terrain: Terrain,
+    made_with: BakeSettings,
+    loads: Sequence[CharacterLoads],
+    debris: Debris | None,
+) -> Slices[Marks | None]:
+    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
+    if not made_with.marks:
+        return None
+    density = surfaces.find(made_with.surface).density
+    shed = shed_volumes(debris) if debris is not None else {}
+    shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
+    marking = marks_of.slices(
+        loads,
+        left.steps,
+        terrain,
+        surface=made_with.surface,
+        shed={step: volume * density for step, volume in shed.items()},
+        treads=dict.fromkeys(shod, made_with.tread_m),
+    )
+    return (yield from marking)
 
 
 def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:

@@ -179,10 +179,3 @@ class _Graph(NodeGraph):
 
     def random_turn(self, seed: int) -> Any:
         return self.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, seed, "FLOAT_VECTOR")
-
-    def without(self, geometry: Any, selection: Any) -> Any:
-        node = self.node("GeometryNodeDeleteGeometry")
-        node.domain = "POINT"
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        return node.outputs["Geometry"]

@@ -15,17 +15,15 @@ from ...core.debris.debris import Debris
 from ...core.ground import surfaces
 from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
+from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import inputs_of, modifier_with
-from ..settings import exists, find, name_of
+from ..settings import find, name_of
 from . import debris_nodes as nodes
 from . import debris_shapes
 
 NAME = MODIFIER = nodes.GROUP
-THROWN, THROWN_BY = "softground_thrown", "softground_thrown_by"
-"""Properties of the ground, its debris, and of debris, its ground."""
-AWAY = "softground_away"
-"""Property of debris that is in no scene while its ground is deleted."""
+BELONGS = Belonging(nodes.MARK, "softground_thrown", "softground_thrown_by")
 ORIGIN, MADE_FOR = "softground_origin", "softground_made_for"
 """Properties of its points, where their origin was [Blender units], and of its node group, for what it was made."""
 
@@ -68,17 +66,12 @@ def put(
     surface : str
     units : SceneUnits
     """
-    left = [obj for obj in bpy.data.objects if _is_left_for(ground, obj)]
-    older = None
-    if debris is not None and len(debris.birth):
-        older = of(ground) or next(iter(left), None)
-    for owner in {ground, *map(_owner_of, left)}:
-        if owner.get(THROWN) != older:
-            remove(owner)
+    older = BELONGS.kept(ground, wanted=debris is not None and bool(len(debris.birth)))
+    _remove_unused()
     if debris is None or not len(debris.birth):
         return None
     before = _origin_of(older) if older else Vector()
-    follows = older is None or older.parent == _owner_of(older)  # or the user has given it another parent
+    follows = older is None or older.parent == BELONGS.owner_of(older)  # or the user has given it another parent
     origin = ground.matrix_world.translation if follows else before  # of both, or a line would be drawn between them
     modifier: Any = _modifier_of(older) if older else None
     with none_left_if_it_fails():
@@ -86,55 +79,18 @@ def put(
         group = _group_for(modifier and modifier.node_group, surface, units)
     obj = older or bpy.data.objects.new(NAME, points)
     if older:
-        _owner_of(older).pop(THROWN, None)
-        _exchange(older, points)
-    obj[nodes.MARK], obj[THROWN_BY], ground[THROWN] = True, ground, obj
+        exchange(older, points)
+    BELONGS.give(ground, obj)
     if follows:
         obj.parent, obj.matrix_parent_inverse = ground, ground.matrix_world.inverted()
         obj.location += origin - before
-    if not obj.users_collection:
-        _link(obj, ground)
     _play(modifier or obj.modifiers.new(MODIFIER, "NODES"), group)
     return obj
 
 
 def of(ground: bpy.types.Object) -> bpy.types.Object | None:
     """The debris of a ground's bake; none of a ground that is a duplicate."""
-    debris = ground.get(THROWN)
-    belongs = exists(debris) and debris.get(nodes.MARK) and _owner_of(debris) == ground
-    return debris if belongs else None
-
-
-def follow(ground: bpy.types.Object, *, is_deleted: bool) -> None:
-    """Take debris out of the scene while its ground is deleted, so that it hangs in no air, and back in after undo."""
-    debris = ground.get(THROWN)
-    if debris is None or _owner_of(debris) != ground:
-        return
-    if is_deleted and exists(debris):
-        debris[AWAY] = True
-        for collection in debris.users_collection:
-            collection.objects.unlink(debris)
-    elif not is_deleted and AWAY in debris.keys():  # noqa: SIM118  (an ID is no mapping)
-        _link(debris, ground)
-
-
-def _link(debris: bpy.types.Object, ground: bpy.types.Object) -> None:
-    debris.pop(AWAY, None)
-    for collection in ground.users_collection:
-        collection.objects.link(debris)
-
-
-def _owner_of(debris: bpy.types.Object) -> Any:
-    """The ground whose bake threw it."""
-    return debris.get(THROWN_BY)
-
-
-def _is_left_for(ground: bpy.types.Object, obj: bpy.types.Object) -> bool:
-    """True for debris that is away, or whose own ground was deleted; duplicates of it are the user's."""
-    owner = _owner_of(obj) if obj.get(nodes.MARK) else None
-    if owner is None or owner.get(THROWN) != obj:
-        return False
-    return not exists(owner) or (owner == ground and AWAY in obj.keys())  # noqa: SIM118  (an ID is no mapping)
+    return BELONGS.of(ground)
 
 
 def _origin_of(debris: bpy.types.Object) -> Vector:
@@ -207,13 +163,8 @@ class Pieces:
 
 def remove(ground: bpy.types.Object) -> None:
     """Take a ground's debris away; nothing happens where there is none."""
-    obj = ground.pop(THROWN, None)
-    if obj is not None and obj.get(nodes.MARK) and _owner_of(obj) == ground:
-        mesh: Any = obj.data
-        bpy.data.objects.remove(obj)
-        if mesh is not None and not mesh.users:
-            bpy.data.meshes.remove(mesh)
-        _remove_unused()
+    BELONGS.remove(ground)
+    _remove_unused()
 
 
 def _remove_unused() -> None:
@@ -222,17 +173,6 @@ def _remove_unused() -> None:
         bpy.data.node_groups.remove(group)
     for shapes in [block for block in bpy.data.collections if block.get(nodes.MARK) and not block.users]:
         debris_shapes.remove(shapes)
-
-
-def _exchange(debris: bpy.types.Object, points: bpy.types.Mesh) -> None:
-    """Give debris new points, under the name of its own; its materials, and all else that the user did to it, stay."""
-    old: Any = debris.data
-    for material in old.materials:
-        points.materials.append(material)
-    name = old.name
-    old.user_remap(points)  # also of linked duplicates
-    bpy.data.meshes.remove(old)
-    points.name = name
 
 
 def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:

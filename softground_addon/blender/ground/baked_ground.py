@@ -21,6 +21,7 @@ from ...core.record.edits import StepEdit, with_names
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample
 from ...core.settings import ObjectName
+from ..carried import marks_object
 from ..debris import debris_object
 from ..jobs import Job, Progress
 from ..plants import trampling_table
@@ -95,6 +96,7 @@ def clear(ground: bpy.types.Object) -> None:
     for obj in dict.fromkeys((ground, display_mesh_of(ground))):
         ground_checks.check_writable(obj)
     debris_object.remove(ground)
+    marks_object.remove(ground)
     trampling_table.clear(ground)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)

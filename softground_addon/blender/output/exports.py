@@ -18,6 +18,7 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
+from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import display_key, own_data, playback, weather_modifier
@@ -69,6 +70,7 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
     with (
         _only(scene, display_mesh, start, end),
         debris_points.selected(scene, ground, clouds=False),
+        _with_marks(ground),
         replacing(path) as partial,
     ):
         shown = display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -76,6 +78,8 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
         size = size_of_alembic(ground_mesh.mesh_of(shown), frames)
         if debris is not None:
             size += frames * BYTES_OF_A_POINT * len(ground_mesh.mesh_of(debris).vertices)
+        if (marks := marks_object.of(ground)) is not None:
+            size += frames * size_of_alembic(ground_mesh.mesh_of(marks), 1)  # there are more from frame to frame
         check_room(path, size)  # else Blender ends
         options = {
             "selected": True,
@@ -116,6 +120,7 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
     with (
         _only(scene, baked_display_mesh(ground), start, end),
         debris_points.selected(scene, ground, clouds=True),
+        _with_marks(ground),
         replacing(path) as partial,
     ):
         options = {
@@ -198,6 +203,20 @@ def baked_display_mesh(ground: bpy.types.Object) -> bpy.types.Object:
     if not ground_mesh.is_baked(display_mesh):
         raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
     return display_mesh
+
+
+@contextmanager
+def _with_marks(ground: bpy.types.Object) -> Iterator[None]:
+    """Marks of a ground's bake selected too, where they are shown."""
+    marks = marks_object.of(ground)
+    if marks is None or marks.name not in bpy.context.view_layer.objects:
+        yield
+        return
+    marks.select_set(True)
+    try:
+        yield
+    finally:
+        marks.select_set(False)
 
 
 @contextmanager

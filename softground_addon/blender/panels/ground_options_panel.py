@@ -9,6 +9,7 @@ import bpy
 from ...core.composers.relief_plan import IMAGE
 from ...core.loads.cell_limits import Coverage, Fineness, duration
 from .. import settings
+from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import painted_ground
 from ..operators import prediction
@@ -53,6 +54,10 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "debris")
         if options.debris and options.ground is not None:
             _wind(column, options.ground)
+        column.prop(options, "marks")
+        if options.marks and options.ground is not None and (marks := marks_object.of(options.ground)):
+            for name, field in marks_object.fields_of(marks):
+                column.prop(*field, text=name)
 
 
 class SOFTGROUND_PT_material(AdvancedPanel, bpy.types.Panel):

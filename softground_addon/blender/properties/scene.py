@@ -317,6 +317,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "is missing from the rims",
         default=DEFAULT.debris,
     )
+    marks: BoolProperty(
+        name="Leave Marks",
+        description="Let soles carry mud, wet sand and snow onto hard ground and leave marks there: fainter with each "
+        "step, drying as they lie. Without hard ground in the shot, nothing changes",
+        default=True,
+    )
     steps_feel_weather: BoolProperty(
         name="Steps Feel Weather",
         description="Bake on the weathered ground: steps press fresh snow, and what the weather has left of earlier "

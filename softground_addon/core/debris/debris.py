@@ -164,6 +164,13 @@ def volumes(sources: Sequence[Source]) -> dict[int, dict[str, float]]:
     return thrown
 
 
+def shed_volumes(debris: Debris) -> dict[int, float]:
+    """Volume that soles shed in the air after each step, by its number [m³]."""
+    shed = debris.kind == ThrowKind.SHED
+    volume = np.bincount(debris.step[shed], 4 / 3 * np.pi * debris.radius[shed] ** 3)
+    return {int(step): float(volume[step]) for step in np.flatnonzero(volume)}
+
+
 @sliced
 def throw(
     sources: Sequence[Source],

@@ -35,6 +35,7 @@ def build(
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
+    carried_kg: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """The whole report of a bake, ready for JSON.
 
@@ -66,6 +67,8 @@ def build(
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
         From `core.events.events`.
+    carried_kg : mapping, optional
+        Masses that soles carried onto hard floors, of a `core.carried.film.CarriedMass`.
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
@@ -90,6 +93,8 @@ def build(
         "self_check": [finding.as_dict() for finding in worst_first(findings)],
         "warnings": [finding.text for finding in worst_first(findings)],
     }
+    if carried_kg is not None:
+        report["totals"]["carried_kg"] = dict(carried_kg)
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:

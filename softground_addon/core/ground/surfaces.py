@@ -133,6 +133,33 @@ class Soaking:
 
 
 @dataclass(frozen=True)
+class CarriedFilm:
+    """What stays on a sole that leaves the ground, and comes off on hard floors.
+
+    Attributes
+    ----------
+    kind : str
+        One of `CARRIED_KINDS`.
+    most, taken : float
+        Mass per area of the sole at most, and that a clean one takes up in one step [kg/m²].
+    left : float
+        Share of it that a sole which presses hard leaves on a floor.
+    water : float
+        Share of the mass that dries.
+    """
+
+    kind: str
+    most: float
+    taken: float
+    left: float
+    water: float
+
+
+CARRIED_KINDS = ("mud", "sand", "snow")
+"""What soles carry, in the order of the numbers by which marks name it."""
+
+
+@dataclass(frozen=True)
 class SurfaceRecord:
     """What a ground is made of.
 
@@ -161,6 +188,8 @@ class SurfaceRecord:
     control : str or None
         Field of the panel that sets the stiffness by what people know: 'hand_hardness' of snow, 'moisture' of sand,
         'soil_moisture' of soil and mud.
+    carried : CarriedFilm or None
+        What soles carry away; None of what is dry, which does not stick.
     """
 
     name: str
@@ -180,6 +209,7 @@ class SurfaceRecord:
     wet: bool = False
     pales: bool = False
     control: str | None = None
+    carried: CarriedFilm | None = None
 
     @property
     def label(self) -> str:
@@ -201,6 +231,7 @@ SURFACES = {record.name: record for record in (
         colour=(0.87, 0.90, 0.94), shades=(0.92, 1.0), swell=0.50,
         shader="snow", relief="snow", midi_note=36,
         drifts_from=0.27, melts=True, control="hand_hardness",
+        carried=CarriedFilm("snow", most=0.3, taken=0.2, left=0.5, water=1.0),
     ),
     SurfaceRecord(
         "sand",
@@ -221,6 +252,7 @@ SURFACES = {record.name: record for record in (
         colour=(0.24, 0.16, 0.09), shades=(0.74, 1.18), swell=0.14,
         shader="wet_sand", relief="wet_sand", midi_note=44,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
+        carried=CarriedFilm("sand", most=0.8, taken=0.5, left=0.35, water=0.2),
     ),
     SurfaceRecord(
         "mud",
@@ -234,6 +266,7 @@ SURFACES = {record.name: record for record in (
         colour=(0.10, 0.065, 0.04), shades=(0.70, 1.25), swell=0.16,
         shader="mud", relief="mud", midi_note=48,
         soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",
+        carried=CarriedFilm("mud", most=3.5, taken=2.5, left=0.2, water=0.35),
     ),
     SurfaceRecord(
         "soil",

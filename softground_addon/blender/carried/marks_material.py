@@ -1,0 +1,108 @@
+"""The material of marks: where a sole has left enough, broken by its tread and by chance, wet or dry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.ground.surfaces import SurfaceRecord
+from ..compat import shader_tree
+from ..shader_graph import Graph, Socket
+from . import marks_nodes as nodes
+
+COVERED = 0.16
+"""Part of the thickest film on a sole that covers a floor under the parts of the sole that press."""
+LUGS, SLANT, GROOVES = 0.019, 0.6, (0.20, 0.30)
+"""Pitch of the lugs of a shoe [m], how far they run back to the sides, and where in each a groove begins."""
+WARP = 0.012
+"""How far lumps bend the edges of lugs, over the size of the noise [m]."""
+SMEAR = 0.4
+"""How much of the floor a smear between lumps covers."""
+DRY_SHADE = 2.6
+"""How much paler mud is when it is dry."""
+CLODS = 3e-3
+"""Height of clods where a mark is thickest [m]."""
+WET_SHADE = 0.55
+"""Light that a wet floor gives back, over that of a dry one."""
+
+
+def material_for(surface: SurfaceRecord) -> bpy.types.Material:
+    """A new material of marks of a surface."""
+    material = bpy.data.materials.new(f"SoftGround {surface.label} Marks")
+    material[nodes.MARK], material.diffuse_color = surface.name, (*surface.colour, 1.0)
+    tree = shader_tree(material)
+    tree.nodes.clear()
+    graph = Graph(tree)
+    amount, edge = _amount(graph, surface)
+    wet = graph.attribute(nodes.WETNESS)
+    if surface.melts:
+        shader, height = _snow(graph, amount, edge, wet)
+    else:
+        shader, height = _earth(graph, surface, amount, edge, wet)
+    relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Displacement": graph.out(relief)})
+    return material
+
+
+def _amount(graph: Graph, surface: SurfaceRecord) -> tuple[Socket, Socket]:
+    """How much lies at a place, over what covers a floor, and 1 under the sole, 0 beside it."""
+    assert surface.carried is not None
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    sole = graph.node("ShaderNodeAttribute", attribute_name=nodes.SOLE)
+    separate = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(sole, 1)})
+    along, across, distance = (graph.out(separate, axis) for axis in range(3))
+    coarse, fine = graph.swing(place, 0.022, 4.0, 0.65), graph.swing(place, 0.004, 3.0, 0.6)
+    aside = graph.math("ABSOLUTE", across, 0.0)
+    phase = graph.math("FRACT", (along + aside * SLANT + coarse * WARP) * (1.0 / LUGS), 0.0)
+    groove = graph.math("ABSOLUTE", phase + -0.5, 0.0)
+    is_shod = graph.math("GREATER_THAN", graph.attribute(nodes.TREAD), 0.0)
+    lug = graph.blend(is_shod, 0.8, graph.ramp(groove, *GROOVES, 1.0, 0.25))
+    full = graph.attribute(nodes.MASS) * (1.0 / (COVERED * surface.carried.most))
+    patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.55, 1.3)
+    amount = full * lug * patches + (coarse * 1.7 + fine * 0.9) * graph.ramp(full, 0.0, 0.5)
+    ragged = distance + coarse * 0.010 + fine * 0.004
+    return amount, graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
+
+
+def _earth(graph: Graph, surface: SurfaceRecord, amount: Socket, edge: Socket, wet: Socket) -> tuple[Socket, Socket]:
+    """Mud or sand: wet it is dark and shines, dry it is pale and has flaked off where it was thin."""
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    flaked = graph.blend(wet, 0.12, 0.0)
+    solid = graph.ramp(graph.math("SUBTRACT", amount, flaked), 0.18, 0.45) * edge
+    smeared = graph.ramp(graph.math("SUBTRACT", amount, flaked), -0.25, 0.4) * edge * SMEAR
+    alpha = graph.math("MAXIMUM", solid, smeared)
+    pale: Any = tuple(min(1.0, part * DRY_SHADE) for part in surface.colour)
+    uneven = graph.swing(place, 0.012, 3.0) * 0.5
+    colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), pale, surface.colour)
+    height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * CLODS)
+    inputs = {
+        "Base Color": colour,
+        "Roughness": graph.blend(wet, 0.92, 0.34) + uneven * 0.3,
+        "Alpha": alpha,
+    }
+    return graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs)), height
+
+
+def _snow(graph: Graph, amount: Socket, edge: Socket, wet: Socket) -> tuple[Socket, Socket]:
+    """Snow, and what is left of it: water, which dries without a trace."""
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    melted = graph.attribute(nodes.MELTED)
+    alpha = graph.ramp(graph.math("SUBTRACT", amount, melted * 1.2), 0.05, 0.30) * edge
+    inputs = {"Base Color": (0.87, 0.90, 0.94, 1.0), "Roughness": 0.7, "Alpha": alpha}
+    lying = graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs))
+    thin = graph.ramp(amount, 0.05, 0.2) * edge * graph.ramp(melted, 0.0, 0.5) * graph.ramp(wet, 0.0, 0.4)
+    shown = graph.node("ShaderNodeMixShader", {0: thin, 1: _clear(graph, 1.0), 2: _water(graph)})
+    whole = graph.node("ShaderNodeMixShader", {0: alpha, 1: graph.out(shown), 2: lying})
+    return graph.out(whole), alpha * (graph.noise(place, 0.008, 4.0, 0.6) * CLODS)
+
+
+def _water(graph: Graph) -> Socket:
+    """A film of water: the floor is darker through it, and it mirrors."""
+    facing = graph.out(graph.node("ShaderNodeFresnel", {"IOR": 1.33}))
+    mirror = graph.out(graph.node("ShaderNodeBsdfAnisotropic", {"Roughness": 0.08}))
+    return graph.out(graph.node("ShaderNodeMixShader", {0: facing, 1: _clear(graph, WET_SHADE), 2: mirror}))
+
+
+def _clear(graph: Graph, shade: float) -> Socket:
+    return graph.out(graph.node("ShaderNodeBsdfTransparent", {"Color": (shade, shade, shade, 1.0)}))

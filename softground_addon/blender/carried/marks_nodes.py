@@ -1,0 +1,81 @@
+"""The node group that plays marks: those to come are hidden, those that lie there dry, and snow melts.
+
+It is native Blender data and needs nothing of this add-on; the laws are those of `core.weather.weather`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...core.ground.surfaces import SurfaceRecord
+from ...core.weather import weather
+from ..node_graph import NodeGraph, Number
+from ..node_modifiers import new_group
+
+GROUP = "SoftGround Marks"
+MARK = "softground_marks"
+"""Custom property of the group, of its object and of the material."""
+
+BIRTH, MASS, KIND, WETNESS, SOLE, STEP = "birth", "mass", "kind", "wetness", "sole", "step"
+"""Of a vertex: frame from which it is there, mass [kg/m²], number among `surfaces.CARRIED_KINDS`, wet look from 1 to 0,
+place along and across the sole and distance to its outline [m], number of the contact."""
+TREAD = "tread"
+"""Depth of the grooves of the sole [m], 0 of bare feet."""
+MELTED = "melted"
+"""Share of snow that has melted, 0 to 1."""
+
+INPUTS = (
+    (
+        "Drying",
+        0.2,
+        0.0,
+        50.0,
+        "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
+    ),
+    ("Temperature", 10.0, -60.0, 60.0, "Temperature of the floor in °C: above 0, snow on it melts"),
+    ("Time Scale", 1.0, 0.0, 1e7, "How many times faster than the animation marks dry and melt"),
+)
+"""Name, value, least, most and description of each of the group's inputs; only snow has a temperature."""
+MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
+"""In metres per second."""
+
+
+def inputs_for(surface: SurfaceRecord) -> list[tuple[str, float, float, float, str]]:
+    """The inputs that marks of a surface have."""
+    return [entry for entry in INPUTS if entry[0] != "Temperature" or surface.melts]
+
+
+def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
+    """A new node group for marks of a surface, in a scene whose time counts so many frames per second."""
+    assert surface.carried is not None
+    graph = NodeGraph(new_group(GROUP, MARK))
+    geometry, sliders = _inputs(graph, surface)
+    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
+    age = (graph.number(frame) - graph.number(graph.attribute(BIRTH))) / frame_rate
+    geometry = graph.without(geometry, graph.compare("LESS_THAN", age.socket, 0.0))
+    passed = age * sliders["Time Scale"]
+    water = graph.number(graph.attribute(MASS)) * (surface.carried.water / weather.WATER_DENSITY)
+    if surface.melts:
+        rate = weather.melting_rate(sliders["Temperature"])
+        melted = (passed * rate / water).within_one()
+        geometry = graph.store(geometry, MELTED, melted.socket, True)
+        passed = np.maximum(passed - water / rate, 0.0) * rate.above(0.0)
+    lost = passed * sliders["Drying"] * MILLIMETRES_PER_HOUR
+    wet = weather.wetness(lost / water * weather.SURFACE_FILM)
+    graph.finish(graph.store(geometry, WETNESS, wet.socket, True))
+    return graph.tree
+
+
+def _inputs(graph: NodeGraph, surface: SurfaceRecord) -> tuple[Any, dict[str, Number]]:
+    interface = graph.tree.interface
+    for way in ("INPUT", "OUTPUT"):
+        interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    for name, value, least, most, description in inputs_for(surface):
+        socket = interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
+        socket.default_value, socket.min_value, socket.max_value = value, least, most
+        socket.description = description
+    group = graph.node("NodeGroupInput")
+    names = [name for name, *_ in inputs_for(surface)]
+    return group.outputs["Geometry"], {name: graph.number(group.outputs[name]) for name in names}

@@ -1,0 +1,153 @@
+"""The object `SoftGround Marks`: what soles leave on hard floors, put beside the ground of a bake and taken away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core.carried.marks import Marks
+from ...core.ground import surfaces
+from ...core.meshing.face_edges import face_edges
+from ...core.rig.recording import SceneUnits
+from .. import compat, mesh_arrays
+from ..belongings import Belonging, exchange
+from ..drafts import none_left_if_it_fails
+from ..node_modifiers import inputs_of, modifier_with
+from . import marks_nodes as nodes
+from .marks_material import material_for
+
+NAME = nodes.GROUP
+BELONGS = Belonging(nodes.MARK, "softground_marked", "softground_marked_by")
+ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
+"""Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
+
+
+def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: SceneUnits) -> bpy.types.Object | None:
+    """Let a ground have marks in place of those that it may have; None takes them away.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    marks : Marks or None
+    surface : str
+    units : SceneUnits
+    """
+    older = BELONGS.kept(ground, wanted=marks is not None and bool(len(marks.faces)))
+    _remove_unused()
+    if marks is None or not len(marks.faces):
+        return None
+    modifier: Any = _modifier_of(older) if older else None
+    before = Vector(older.data.get(ORIGIN, older.location)) if older else Vector()
+    with none_left_if_it_fails():
+        mesh = _mesh(marks, surface, units)
+        group = _group_for(modifier and modifier.node_group, surface, units)
+        if not older or _is_ours_of_another(older, surface):
+            mesh.materials.append(material_for(surfaces.find(surface)))
+    obj = older or bpy.data.objects.new(NAME, mesh)
+    if older:
+        if len(mesh.materials):
+            older.data.materials.clear()
+        exchange(older, mesh)
+    obj.location += Vector(mesh[ORIGIN]) - before
+    BELONGS.give(ground, obj)
+    _play(modifier or obj.modifiers.new(NAME, "NODES"), group)
+    _remove_unused()
+    return obj
+
+
+def of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The marks of a ground's bake; none of a ground that is a duplicate."""
+    return BELONGS.of(ground)
+
+
+def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
+    """Sliders of the marks by name, as `layout.prop` takes them."""
+    modifier = _modifier_of(obj)
+    if modifier is None:
+        return []
+    inputs = inputs_of(modifier)
+    return [(name, compat.input_field(modifier, inputs[name])) for name, *_ in nodes.INPUTS if name in inputs]
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take a ground's marks away; nothing happens where there are none."""
+    BELONGS.remove(ground)
+    _remove_unused()
+
+
+def _remove_unused() -> None:
+    """Remove groups and materials that no marks have any more."""
+    blocks = (*bpy.data.node_groups, *bpy.data.materials)
+    bpy.data.batch_remove([block for block in blocks if block.get(nodes.MARK) and not block.users])
+
+
+def _is_ours_of_another(obj: bpy.types.Object, surface: str) -> bool:
+    """True if its materials are ours, and none for this surface."""
+    found = [slot.get(nodes.MARK) for slot in obj.data.materials if slot is not None]
+    return all(found) and surface not in found
+
+
+def _modifier_of(obj: bpy.types.Object) -> Any:
+    return modifier_with(obj, lambda group: bool(group.get(nodes.MARK)))
+
+
+def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
+    """The node group that marks have, or a new one if it is for another surface or other units."""
+    frame_rate = units.frame_rate * units.time_stretch
+    made_for = f"{surface} {frame_rate}"
+    if not group or group.get(MADE_FOR) != made_for:
+        group = nodes.build(surfaces.find(surface), frame_rate=frame_rate)
+        group[MADE_FOR] = made_for
+    return group
+
+
+def _play(modifier: Any, group: Any) -> None:
+    """Have marks play a group, with what the artist has set."""
+    if modifier.node_group == group:
+        return
+    kept = {}
+    if modifier.node_group:
+        kept = {name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if key}
+    modifier.node_group = group
+    sockets = inputs_of(modifier)
+    for name, value, *_ in nodes.INPUTS:
+        if name in sockets:
+            compat.write_input(modifier, sockets[name], kept[name] if kept.get(name) is not None else value)
+
+
+def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
+    """The mesh of marks, as seen from its first vertex."""
+    record = surfaces.find(surface)
+    assert record.carried is not None
+    unit_scale = units.unit_scale_m
+    thick = marks.position + (0.0, 0.0, 1.0) * (marks.mass / record.density)[:, None]
+    place, origin = thick / unit_scale, marks.position[0] / unit_scale
+    mesh = bpy.data.meshes.new(NAME)
+    mesh[ORIGIN] = origin.tolist()
+    mesh.vertices.add(len(place))
+    mesh.vertices.foreach_set("co", (place - origin).astype(np.float32).ravel())
+    corners, starts = marks.faces.ravel(), 4 * np.arange(len(marks.faces))
+    edges, of_corner = face_edges(corners, starts)
+    mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
+    kind = np.full(len(place), surfaces.CARRIED_KINDS.index(record.carried.kind))
+    columns: tuple[tuple[str, Any, NDArray[Any]], ...] = (
+        (nodes.BIRTH, "FLOAT", marks.birth * units.time_stretch),
+        (nodes.MASS, "FLOAT", marks.mass),
+        (nodes.TREAD, "FLOAT", marks.tread),
+        (nodes.KIND, "INT8", kind),
+        (nodes.STEP, "INT", marks.step),
+        (nodes.SOLE, "FLOAT_VECTOR", marks.sole),
+    )
+    for name, data_type, values in columns:
+        attribute: Any = mesh.attributes.new(name, data_type, "POINT")
+        if data_type == "FLOAT_VECTOR":
+            attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
+        else:
+            attribute.data.foreach_set("value", values.astype(np.float32 if data_type == "FLOAT" else np.int32))
+    mesh.update()
+    return mesh

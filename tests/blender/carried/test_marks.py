@@ -1,0 +1,214 @@
+"""Marks on hard ground: they play by their nodes alone, and Clear takes all of them away."""
+
+import re
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
+from softground_addon.blender.baking import bake_job, bake_report, step_edits
+from softground_addon.blender.carried import marks_object
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.output import exports
+from softground_addon.core.ground.surfaces import CARRIED_KINDS
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit
+from softground_addon.core.weather import weather
+from tests.blender.ground.test_hard_ground import listed, over_a_crate
+from tests.blender.grounds import bake, heights
+
+HEIGHT = 0.2
+
+
+def over_a_muddy_crate(scene):
+    over_a_crate(scene, HEIGHT)
+    scene.softground.material.surface = "mud"
+    listed(bpy.data.objects["Crate"])
+
+
+@pytest.fixture(scope="module")
+def baked(addon, tmp_path_factory):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    over_a_muddy_crate(scene)
+    result = jobs.run(bake_job.bake(scene))
+    path = tmp_path_factory.mktemp("marks") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path, result
+
+
+@pytest.fixture
+def scene(baked):
+    bpy.ops.wm.open_mainfile(filepath=str(baked[0]))
+    return bpy.context.scene
+
+
+def values(mesh, name, size=1):
+    out = np.empty(len(mesh.vertices) * size, np.float32)
+    mesh.attributes[name].data.foreach_get("vector" if size == 3 else "value", out)
+    return out.reshape(-1, size) if size > 1 else out
+
+
+def shown(obj):
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def at(scene, frame):
+    scene.frame_set(frame)
+    return shown(marks_object.of(scene.softground.ground))
+
+
+def set_input(obj, name, value):
+    modifier = obj.modifiers[0]
+    compat.write_input(modifier, node_modifiers.inputs_of(modifier)[name], value)
+    obj.update_tag()
+
+
+def blocks():
+    kinds = ("objects", "meshes", "materials", "node_groups")
+    return {(kind, block.name) for kind in kinds for block in getattr(bpy.data, kind)}
+
+
+def test_marks_lie_on_the_crate_and_weigh_what_the_report_says(scene, baked):
+    obj = marks_object.of(scene.softground.ground)
+    assert obj.name == "SoftGround Marks"
+    place = mesh_arrays.positions(obj.data) + np.array(obj.location)
+    mass = values(obj.data, "mass")
+    assert place[:, 2] == pytest.approx(HEIGHT + 0.3e-3 + mass / 1700.0, abs=1e-5)
+    carried = baked[1].report["totals"]["carried_kg"]
+    assert carried["left_behind"] > 0.005
+    assert carried["picked_up"] == pytest.approx(sum(carried.values()) - carried["picked_up"], abs=1e-9)
+    assert {value.value for value in obj.data.attributes["kind"].data} == {CARRIED_KINDS.index("mud")}
+    assert len({value.value for value in obj.data.attributes["step"].data}) >= 2
+
+
+def test_marks_come_with_the_feet_in_any_order_of_frames(scene):
+    birth = values(marks_object.of(scene.softground.ground).data, "birth")
+    counts = {}
+    for frame in (84, 1, 40, 60, 50, 84, 1):
+        count = len(at(scene, frame).vertices)
+        assert count == np.count_nonzero(birth <= frame)
+        assert counts.setdefault(frame, count) == count
+    assert counts[1] == 0
+    assert 0 < counts[60] <= counts[84] == len(birth)
+
+
+def test_marks_dry_as_weather_dries_them(scene):
+    obj = marks_object.of(scene.softground.ground)
+    set_input(obj, "Drying", 0.5)
+    set_input(obj, "Time Scale", 600.0)
+    mesh = at(scene, 84)
+    mass, age = values(mesh, "mass"), (84 - values(mesh, "birth")) / 24 * 600.0
+    water = mass * 0.35 / 1000.0
+    wet = weather.wetness(age * 0.5e-3 / 3600 / np.maximum(water, 1e-12) * weather.SURFACE_FILM)
+    assert values(mesh, "wetness")[mass > 0] == pytest.approx(wet[mass > 0], abs=1e-3)
+    assert 0 < np.mean(wet[mass > 0]) < 1
+
+
+def test_they_play_without_the_add_on(scene, baked):
+    script = (
+        f"import bpy\nbpy.ops.wm.open_mainfile(filepath={str(baked[0])!r})\n"
+        "s, o = bpy.context.scene, bpy.data.objects['SoftGround Marks']\n"
+        "for f in (84, 1, 60):\n    s.frame_set(f)\n"
+        "    graph = bpy.context.evaluated_depsgraph_get()\n"
+        "    print('count', f, len(o.evaluated_get(graph).data.vertices))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    found = {int(f): int(n) for f, n in re.findall(r"count (\d+) (\d+)", done.stdout)}
+    assert found == {frame: len(at(scene, frame).vertices) for frame in (84, 1, 60)}
+
+
+def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
+    ground = scene.softground.ground
+    obj = marks_object.of(ground)
+    obj.hide_render = True
+    obj.location.z += 0.5
+    mine = bpy.data.materials.new("Mine")
+    obj.data.materials[0] = mine
+    set_input(obj, "Drying", 3.0)
+    before = mesh_arrays.positions(obj.data)
+    bake(scene)
+    again = marks_object.of(ground)
+    assert again == obj
+    assert (mesh_arrays.positions(again.data) == before).all()
+    assert again.hide_render
+    assert again.location.z == pytest.approx(HEIGHT + 0.3e-3 + 0.5, abs=1e-3)
+    assert again.data.materials[0] == mine
+    modifier = again.modifiers[0]
+    assert compat.read_input(modifier, node_modifiers.inputs_of(modifier)["Drying"]) == 3.0
+    bpy.ops.softground.clear_bake()
+    assert not [name for _, name in blocks() if "Marks" in name]
+    assert mine.name == "Mine"
+
+
+@pytest.mark.parametrize("change", ["switched off", "dry sand"])
+def test_a_bake_that_leaves_none_takes_older_ones_away(scene, change):
+    if change == "dry sand":
+        scene.softground.material.surface = "sand"
+    else:
+        scene.softground.marks = False
+    result = bake(scene)
+    assert marks_object.of(scene.softground.ground) is None
+    assert not [name for _, name in blocks() if "Marks" in name]
+    assert "carried_kg" not in result.report["totals"]
+
+
+def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(opened_as):
+    scene = opened_as(over_a_muddy_crate)
+    found = {}
+    for marks, hard in ((True, True), (False, True), (True, False), (False, False)):
+        if not hard:
+            scene.softground.hard_grounds.clear()
+            bpy.data.objects["Crate"].hide_render = True
+        scene.softground.marks = marks
+        result = bake(scene)
+        ground = scene.softground.ground
+        inputs = dict(result.report["inputs"])
+        assert inputs.pop("marks", True) == marks
+        found[marks, hard] = (
+            record.dump(record.BakeRecord(list(result.footprints), {})),
+            heights(ground).tobytes(),
+            {key: value for key, value in result.report["totals"].items() if key != "carried_kg"},
+            inputs,
+        )
+        assert (marks_object.of(ground) is not None) == (marks and hard)
+    assert found[True, True] == found[False, True]
+    assert found[True, False] == found[False, False]
+
+
+def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
+    assert bake_report.stale_reasons(scene) == ()
+    scene.softground.marks = False
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+
+
+def test_marks_stay_while_steps_on_the_ground_are_edited(scene):
+    ground = scene.softground.ground
+    before = mesh_arrays.positions(marks_object.of(ground).data).tobytes()
+    editing = step_edits.editable(scene)
+    step_edits.edit(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)})
+    assert mesh_arrays.positions(marks_object.of(ground).data).tobytes() == before
+
+
+@pytest.mark.parametrize(
+    ("suffix", "write", "read"),
+    [
+        ("abc", exports.export_alembic, lambda path: bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)),
+        ("usdc", exports.export_usd, lambda path: bpy.ops.wm.usd_import(filepath=path)),
+    ],
+)
+def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, suffix, write, read):
+    ground = scene.softground.ground
+    counts = {frame: len(at(scene, frame).vertices) for frame in (60, 84)}
+    path = tmp_path / f"shot.{suffix}"
+    write(scene, ground, path, 58, 84)
+    known = set(bpy.data.objects)
+    read(str(path))
+    found = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]
+    assert len(found) == 1
+    for frame, count in counts.items():
+        scene.frame_set(frame)
+        assert len(shown(found[0]).vertices) == count

@@ -1,0 +1,124 @@
+"""Marks on hard floors: they lie on them, in the shape of the sole, and weigh what the soles have left."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid
+from softground_addon.core.carried.marks import marks_of
+from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.terrain import MeshTerrain
+from softground_addon.core.loads.estimate import estimate_loads
+from softground_addon.core.record.record import steps_of
+from tests.core.ground.test_hard_ground import SNOW, lifted, slab, standing_on
+from tests.core.walkers import box_sole, foot_sole, pose, pressed, walk
+
+FLOOR = 0.1
+
+
+@cache
+def crossing(steps=12, onto=2.5, ends=9.0):
+    """A walk from soft ground onto a floor, its record and the ground."""
+    flat = walk(steps=steps).motion
+    motion = lifted(flat, FLOOR, onto, ends)
+    terrain = standing_on([motion], slab((onto, ends), (-1, 1), FLOOR))
+    loads = estimate_loads(motion, terrain, force_model="IMPULSE", material=SNOW)
+    _, footprints = pressed(loads, SNOW, terrain=terrain)
+    return loads, footprints, terrain
+
+
+def marks(surface="mud", muted=(), **options):
+    loads, footprints, terrain = crossing()
+    steps = steps_of(footprints, {}, {}, {})
+    steps = [replace(step, left=None) if step.index in muted else step for step in steps]
+    return marks_of([loads], steps, terrain, surface=surface, **options)
+
+
+def mass_of_steps(found):
+    return np.bincount(found.step, found.mass * found.area)
+
+
+@pytest.mark.parametrize("force", [5.0, 800.0, 3000.0])
+def test_an_elastic_sole_bears_the_force_whatever_its_shape(force):
+    chance = np.random.default_rng(1)
+    gap, area = 0.02 * chance.random((20, 60)), 1e-4 * chance.random(60)
+    gap[:, 50:] = np.inf
+    pressure = bedded(gap + 3.0, area, np.full(20, force))
+    assert pressure @ area == pytest.approx(np.full(20, force), rel=1e-9)
+    assert not pressure[:, 50:].any()
+    level = gap + pressure / BEDDING
+    for row, pressed_row in zip(level, pressure > 0, strict=True):
+        assert np.ptp(row[pressed_row]) < 1e-9
+        assert (row[:50][~pressed_row[:50]] >= row[pressed_row].max() - 1e-12).all()
+    assert not bedded(np.full((1, 4), np.inf), np.ones(4), np.array([force])).any()
+
+
+def test_the_grid_of_a_sole_has_its_area_and_its_outline():
+    sole = box_sole(0.3, 0.1)
+    grid = sole_grid(sole, pose(np.zeros((1, 3))))
+    assert grid.area.sum() == pytest.approx(0.03, rel=0.05)
+    along, across, distance = grid.sole.T
+    inside = (np.abs(across) < 0.05) & (np.abs(along - 0.15) < 0.15)
+    assert ((distance < 0) == inside).all()
+    assert len(grid.faces) < 300
+    foot = foot_sole("foot", "L")
+    assert sole_grid(foot, np.tile(pose(np.zeros(3)), (2, 1, 1))).area.sum() == pytest.approx(foot.area, rel=0.05)
+
+
+def test_a_sole_over_an_edge_leaves_its_mark_on_the_floor_alone():
+    sole = box_sole(0.3, 0.1)
+    grid = sole_grid(sole, pose(np.zeros((1, 3))))
+    hard = MeshTerrain.joined([slab((-1, 0.05), (-1, 1), 0.0), slab((0.05, 1), (-1, 1), -0.2)])
+    terrain = HardOnSoft(FlatTerrain(-1.0), hard, Reach.of(np.array([[0.0, 0.0, 0.5]]), 1.0))
+    found = laid(grid, pose(np.zeros((3, 1, 3))), np.full(3, 700.0), terrain, 0.02)
+    corners = found.position[found.faces]
+    assert len(found.faces)
+    assert corners[..., 0].max() < 0.05 + 1e-9
+    assert corners[..., 2] == pytest.approx(CLEARANCE)
+    assert found.pressure @ grid.area == pytest.approx(700.0, rel=0.1)
+
+
+def test_a_walk_out_of_mud_leaves_marks_that_fade_and_every_gram_is_booked():
+    found = marks(shed={0: 0.01, 3: 0.02})
+    of_steps = mass_of_steps(found)
+    assert len(of_steps) >= 4
+    for foot in (of_steps[: len(of_steps) // 2], of_steps[len(of_steps) // 2 :]):
+        assert (np.diff(foot[1:]) < 0).all()  # the first is half on the edge
+    carried = found.carried
+    assert of_steps.sum() == pytest.approx(carried.left_behind, abs=1e-9)
+    assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
+    assert carried.shed == pytest.approx(0.03)
+    assert 0.005 < of_steps[0] < 0.03
+
+
+def test_marks_lie_on_the_floor_under_the_feet_that_press_them():
+    loads, _, _ = crossing()
+    found = marks()
+    assert found.position[:, 2] == pytest.approx(FLOOR + CLEARANCE)
+    for number in np.unique(found.step):
+        of_step = found.step == number
+        along, across, _ = found.sole[of_step].T
+        place = found.position[of_step]
+        assert np.polyfit(along, place[:, 0], 1)[0] == pytest.approx(1.0, abs=0.06)
+        assert np.polyfit(across, place[:, 1], 1)[0] == pytest.approx(1.0, abs=0.03)
+        heel, toes = along < 0.05, along > 0.22
+        assert found.birth[of_step][heel].min() < found.birth[of_step][toes].min()
+    assert found.birth.min() >= loads.motion.frames[0]
+
+
+def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
+    loads, footprints, terrain = crossing()
+    assert marks("sand") is None
+    assert marks_of([loads], steps_of(footprints, {}, {}, {}), terrain.ground, surface="mud") is None
+
+
+def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():
+    count = len(crossing()[1])
+    whole, fewer, none = marks(), marks(muted=(0, 1)), marks(muted=range(count))
+    assert fewer.carried.picked_up < whole.carried.picked_up
+    assert fewer.carried.left_behind < whole.carried.left_behind
+    assert not len(none.position)
+    assert none.carried.picked_up == 0.0
