@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,14 @@ def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
         attribute: Any = mesh.attributes["position"]
         attribute.data.foreach_get("vector", values)
     return values.reshape(-1, 3)
+
+
+def add_attributes(mesh: bpy.types.Mesh, columns: Iterable[tuple[str, Any, NDArray[Any]]]) -> None:
+    """Give the vertices attributes, each by its name, data type and values (V,) or (V, 3)."""
+    for name, kind, values in columns:
+        attribute: Any = mesh.attributes.new(name, kind, "POINT")
+        flat = values.astype(np.int32 if kind.startswith("INT") else np.float32).ravel()
+        attribute.data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
 
 
 def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

@@ -92,14 +92,17 @@ def _snow(graph: Graph, amount: Socket, edge: Socket, wet: Socket) -> tuple[Sock
     inputs = {"Base Color": (0.87, 0.90, 0.94, 1.0), "Roughness": 0.7, "Alpha": alpha}
     lying = graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs))
     thin = graph.ramp(amount, 0.05, 0.2) * edge * graph.ramp(melted, 0.0, 0.5) * graph.ramp(wet, 0.0, 0.4)
+    is_shadow = graph.out(graph.node("ShaderNodeLightPath"), 1)  # the floor below is lit
+    thin = thin * graph.math("SUBTRACT", 1.0, is_shadow)
     shown = graph.node("ShaderNodeMixShader", {0: thin, 1: _clear(graph, 1.0), 2: _water(graph)})
     whole = graph.node("ShaderNodeMixShader", {0: alpha, 1: graph.out(shown), 2: lying})
-    return graph.out(whole), alpha * (graph.noise(place, 0.008, 4.0, 0.6) * CLODS)
+    return graph.out(whole), alpha * (graph.noise(place, 0.008, 4.0, 0.6) * (0.4 * CLODS))
 
 
 def _water(graph: Graph) -> Socket:
     """A film of water: the floor is darker through it, and it mirrors."""
-    facing = graph.out(graph.node("ShaderNodeFresnel", {"IOR": 1.33}))
+    aside = graph.out(graph.node("ShaderNodeLayerWeight", {"Blend": 0.5}), 1)
+    facing = graph.ramp(aside, 0.4, 1.0, 0.03, 0.6)  # as Fresnel's, from below too
     mirror = graph.out(graph.node("ShaderNodeBsdfAnisotropic", {"Roughness": 0.08}))
     return graph.out(graph.node("ShaderNodeMixShader", {0: facing, 1: _clear(graph, WET_SHADE), 2: mirror}))
 

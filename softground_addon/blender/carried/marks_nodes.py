@@ -42,11 +42,6 @@ MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
 """In metres per second."""
 
 
-def inputs_for(surface: SurfaceRecord) -> list[tuple[str, float, float, float, str]]:
-    """The inputs that marks of a surface have."""
-    return [entry for entry in INPUTS if entry[0] != "Temperature" or surface.melts]
-
-
 def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
     """A new node group for marks of a surface, in a scene whose time counts so many frames per second."""
     assert surface.carried is not None
@@ -72,10 +67,10 @@ def _inputs(graph: NodeGraph, surface: SurfaceRecord) -> tuple[Any, dict[str, Nu
     interface = graph.tree.interface
     for way in ("INPUT", "OUTPUT"):
         interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    for name, value, least, most, description in inputs_for(surface):
+    entries = [entry for entry in INPUTS if entry[0] != "Temperature" or surface.melts]
+    for name, value, least, most, description in entries:
         socket = interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
         socket.default_value, socket.min_value, socket.max_value = value, least, most
         socket.description = description
     group = graph.node("NodeGroupInput")
-    names = [name for name, *_ in inputs_for(surface)]
-    return group.outputs["Geometry"], {name: graph.number(group.outputs[name]) for name in names}
+    return group.outputs["Geometry"], {name: graph.number(group.outputs[name]) for name, *_ in entries}

@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.carried.marks import Marks
 from ...core.ground import surfaces
@@ -22,6 +21,7 @@ from .marks_material import material_for
 
 NAME = nodes.GROUP
 BELONGS = Belonging(nodes.MARK, "softground_marked", "softground_marked_by")
+of = BELONGS.of
 ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 """Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
 
@@ -57,11 +57,6 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     _play(modifier or obj.modifiers.new(NAME, "NODES"), group)
     _remove_unused()
     return obj
-
-
-def of(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The marks of a ground's bake; none of a ground that is a duplicate."""
-    return BELONGS.of(ground)
 
 
 def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
@@ -134,20 +129,14 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     edges, of_corner = face_edges(corners, starts)
     mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
-    kind = np.full(len(place), surfaces.CARRIED_KINDS.index(record.carried.kind))
-    columns: tuple[tuple[str, Any, NDArray[Any]], ...] = (
+    columns = (
         (nodes.BIRTH, "FLOAT", marks.birth * units.time_stretch),
         (nodes.MASS, "FLOAT", marks.mass),
         (nodes.TREAD, "FLOAT", marks.tread),
-        (nodes.KIND, "INT8", kind),
+        (nodes.KIND, "INT8", np.full(len(place), surfaces.CARRIED_KINDS.index(record.carried.kind))),
         (nodes.STEP, "INT", marks.step),
         (nodes.SOLE, "FLOAT_VECTOR", marks.sole),
     )
-    for name, data_type, values in columns:
-        attribute: Any = mesh.attributes.new(name, data_type, "POINT")
-        if data_type == "FLOAT_VECTOR":
-            attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
-        else:
-            attribute.data.foreach_set("value", values.astype(np.float32 if data_type == "FLOAT" else np.int32))
+    mesh_arrays.add_attributes(mesh, columns)
     mesh.update()
     return mesh

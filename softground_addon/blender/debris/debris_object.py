@@ -24,6 +24,7 @@ from . import debris_shapes
 
 NAME = MODIFIER = nodes.GROUP
 BELONGS = Belonging(nodes.MARK, "softground_thrown", "softground_thrown_by")
+of = BELONGS.of
 ORIGIN, MADE_FOR = "softground_origin", "softground_made_for"
 """Properties of its points, where their origin was [Blender units], and of its node group, for what it was made."""
 
@@ -86,11 +87,6 @@ def put(
         obj.location += origin - before
     _play(modifier or obj.modifiers.new(MODIFIER, "NODES"), group)
     return obj
-
-
-def of(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The debris of a ground's bake; none of a ground that is a duplicate."""
-    return BELONGS.of(ground)
 
 
 def _origin_of(debris: bpy.types.Object) -> Vector:
@@ -238,18 +234,16 @@ def _points(debris: Debris, origin: Vector, units: SceneUnits) -> bpy.types.Mesh
     points[ORIGIN] = origin[:]
     points.vertices.add(len(debris.birth))
     points.vertices.foreach_set("co", (rest / unit_scale)[order].astype(np.float32).ravel())
-    columns: tuple[tuple[str, Any, str, Any], ...] = (
-        (nodes.BIRTH, "FLOAT", "value", debris.birth * time_stretch),
-        (nodes.FLIGHT, "FLOAT", "value", debris.time),
-        (nodes.DRAG, "FLOAT", "value", debris.drag_time),
-        (nodes.RADIUS, "FLOAT", "value", debris.radius / unit_scale),
-        (nodes.RANK, "FLOAT", "value", rank),
-        (nodes.START, "FLOAT_VECTOR", "vector", start / unit_scale),
-        (nodes.LAUNCH, "FLOAT_VECTOR", "vector", debris.velocity / unit_scale),
-        (nodes.KIND, "INT", "value", debris.kind),
-        (nodes.STEP, "INT", "value", debris.step),
+    columns = (
+        (nodes.BIRTH, "FLOAT", debris.birth * time_stretch),
+        (nodes.FLIGHT, "FLOAT", debris.time),
+        (nodes.DRAG, "FLOAT", debris.drag_time),
+        (nodes.RADIUS, "FLOAT", debris.radius / unit_scale),
+        (nodes.RANK, "FLOAT", rank),
+        (nodes.START, "FLOAT_VECTOR", start / unit_scale),
+        (nodes.LAUNCH, "FLOAT_VECTOR", debris.velocity / unit_scale),
+        (nodes.KIND, "INT", debris.kind),
+        (nodes.STEP, "INT", debris.step),
     )
-    for name, kind, field, values in columns:
-        attribute: Any = points.attributes.new(name, kind, "POINT")
-        attribute.data.foreach_set(field, values[order].astype(np.int32 if kind == "INT" else np.float32).ravel())
+    mesh_arrays.add_attributes(points, ((name, kind, values[order]) for name, kind, values in columns))
     return points

@@ -68,9 +68,8 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
     """
     display_mesh = baked_display_mesh(ground)
     with (
-        _only(scene, display_mesh, start, end),
+        _only(scene, display_mesh, start, end, marks_object.of(ground)),
         debris_points.selected(scene, ground, clouds=False),
-        _with_marks(ground),
         replacing(path) as partial,
     ):
         shown = display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -118,9 +117,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
             f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
         )
     with (
-        _only(scene, baked_display_mesh(ground), start, end),
+        _only(scene, baked_display_mesh(ground), start, end, marks_object.of(ground)),
         debris_points.selected(scene, ground, clouds=True),
-        _with_marks(ground),
         replacing(path) as partial,
     ):
         options = {
@@ -206,22 +204,11 @@ def baked_display_mesh(ground: bpy.types.Object) -> bpy.types.Object:
 
 
 @contextmanager
-def _with_marks(ground: bpy.types.Object) -> Iterator[None]:
-    """Marks of a ground's bake selected too, where they are shown."""
-    marks = marks_object.of(ground)
-    if marks is None or marks.name not in bpy.context.view_layer.objects:
-        yield
-        return
-    marks.select_set(True)
-    try:
-        yield
-    finally:
-        marks.select_set(False)
-
-
-@contextmanager
-def _only(scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, end: int) -> Iterator[None]:
-    """An object as all that is selected, shown if it is hidden, and the frames as the scene's; then all as before."""
+def _only(
+    scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, end: int, marks: bpy.types.Object | None = None
+) -> Iterator[None]:
+    """An object as all that is selected, shown if it is hidden, with its marks if these are shown, and the frames as
+    the scene's; then all as before."""
     layer = bpy.context.view_layer
     layer.update()
     if display_mesh.name not in layer.objects:
@@ -239,10 +226,13 @@ def _only(scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, en
         display_mesh.select_set(True)
         if not display_mesh.select_get():
             raise InputError(f"'{display_mesh.name}' is hidden with its collection: show the collection first.")
+        if marks is not None and marks.name in layer.objects:
+            marks.select_set(True)
         scene.frame_start, scene.frame_end = start, end
         yield
     finally:
-        display_mesh.select_set(False)
+        for obj in [obj for obj in (display_mesh, marks) if obj is not None and obj.name in layer.objects]:
+            obj.select_set(False)
         display_mesh.hide_set(hidden[0])
         display_mesh.hide_viewport, display_mesh.hide_render = hidden[1:]
         for obj in selected:

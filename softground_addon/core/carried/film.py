@@ -89,10 +89,8 @@ def share_left(pressure: Any, carried: CarriedFilm, slid: float = 0.0) -> Any:
     return np.minimum(carried.left * -np.expm1(-np.asarray(pressure) / PRESSING) * (1.0 + min(slid, 1.0)), 1.0)
 
 
-def carry(
-    meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array, film: Array | None = None
-) -> tuple[list[Array], CarriedMass]:
-    """The film of a sole at each of its meetings with the ground, in their order.
+def carry(meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array) -> tuple[list[Array], CarriedMass]:
+    """The film of a sole that starts clean at each of its meetings with the ground, in their order.
 
     Parameters
     ----------
@@ -100,8 +98,6 @@ def carry(
     carried : CarriedFilm
     areas : (4,) float array
         Of the sole's zones [m²].
-    film : (4,) float array, optional
-        That the sole starts with [kg/m²]; clean by default.
 
     Returns
     -------
@@ -109,8 +105,7 @@ def carry(
         Film that each meeting takes its share of [kg/m²]: 0 where it is a trace, and on soft ground.
     CarriedMass
     """
-    now = np.zeros(len(ZONES)) if film is None else np.array(film, float)
-    booked, giving = CarriedMass(picked_up=float(now @ areas)), []
+    now, booked, giving = np.zeros(len(ZONES)), CarriedMass(), []
     for meeting in meetings:
         if meeting.shares is None:
             more = taken_up(now, carried) - now

@@ -16,7 +16,7 @@ from ..ground.hard_ground import HardOnSoft
 from ..ground.heightfield import Terrain
 from ..ground.surfaces import CarriedFilm
 from ..imprints.sole_points import flat_pose
-from ..loads.contacts import REST_SPEED, TOUCH_HEIGHT
+from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
@@ -45,8 +45,6 @@ class Marks:
         Left there [kg/m²].
     area : (V,) float array
         That each stands for [m²].
-    pressure : (V,) float array
-        [Pa]
     sole : (V, 3) float array
         As of `SoleGrid` [m].
     tread : (V,) float array
@@ -61,7 +59,6 @@ class Marks:
     birth: Array
     mass: Array
     area: Array
-    pressure: Array
     sole: Array
     tread: Array
     step: NDArray[np.intp]
@@ -70,10 +67,9 @@ class Marks:
 
 @dataclass(frozen=True)
 class _Contact:
-    """A contact of a sole with a hard floor: as it meets it, where it lies, and its frames."""
+    """A contact of a sole with a hard floor: as it meets it, where it lies, the share each node leaves, its frames."""
 
     meeting: Meeting
-    of_zones: Array
     laid: HardPrint
     shares: Array
     frames: Array
@@ -119,8 +115,8 @@ def marks_of(
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
-            for first, end in zip(*runs(hard[:, index]), strict=True):
-                contacts.append(_contact(character, index, grid, slice(first, end), terrain, carried))
+            for during in _pieces(hard[:, index], slid := _slid(character, index)):
+                contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
                 yield
             meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
             giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area))
@@ -128,7 +124,7 @@ def marks_of(
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
             for contact in contacts:
                 film = given[id(contact.meeting)]
-                if (film * contact.of_zones > 0).any():
+                if (film[grid.zone] * contact.shares > 0).any():
                     depth = treads.get((character.motion.name, motion.sole.name), 0.0)
                     parts.append(_mark(grid, contact, film, count, depth))
                     count += 1
@@ -147,11 +143,26 @@ def _soft_meetings(
             yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0))
 
 
+def _slid(character: CharacterLoads, index: int) -> Array:
+    """Way that a sole has slid under load up to each step, (N,), in sole lengths."""
+    motion, speed = character.motion, slide_speed(character, index)
+    slides = (speed > REST_SPEED * motion.froude_speed) & (normal_force(character, index) > 0)
+    return np.cumsum(speed * slides) * motion.time_step / motion.soles[index].sole.length
+
+
+def _pieces(hard: NDArray[np.bool_], slid: Array) -> Iterator[slice]:
+    """The contacts of a sole with hard floors, cut where it has slid on by its length."""
+    for first, end in zip(*runs(hard), strict=True):
+        cuts = first + 1 + np.flatnonzero(np.diff(np.floor(slid[first:end] - slid[first])))
+        yield from map(slice, (first, *cuts), (*cuts, end))
+
+
 def _contact(
     character: CharacterLoads,
     index: int,
     grid: SoleGrid,
     during: slice,
+    slid: Array,
     terrain: HardOnSoft,
     carried: CarriedFilm,
 ) -> _Contact:
@@ -160,15 +171,12 @@ def _contact(
     poses = motion.soles[index].transforms[steps].copy()
     lift = character.contacts.offset[index] * character.contacts.normal[steps, index]
     poses[..., :3, 3] -= lift[:, None]  # the float or sink of the source
-    force, tolerance = normal_force(character, index)[steps], TOUCH_HEIGHT * motion.leg_length
+    force, tolerance = normal_force(character, index)[steps], LEAVE_HEIGHT * motion.leg_length
     print_ = laid(grid, poses, force, terrain, tolerance)
-    speed = slide_speed(character, index)[during]
-    slides = speed * (speed > REST_SPEED * motion.froude_speed) * (normal_force(character, index)[during] > 0)
-    slid = float(slides.sum()) * motion.time_step / motion.soles[index].sole.length
-    shares = share_left(print_.pressure, carried, slid)
+    shares = share_left(print_.pressure, carried, float(slid[during.stop - 1] - slid[during.start]))
     of_zones = _by_zone(grid, shares * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
     frames = motion.frames[steps]
-    return _Contact(Meeting(float(frames[0]), of_zones), of_zones, print_, shares, frames)
+    return _Contact(Meeting(float(frames[0]), of_zones), print_, shares, frames)
 
 
 def _by_zone(grid: SoleGrid, values: Array) -> Array:
@@ -184,7 +192,6 @@ def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int, tread: fl
         contact.frames[contact.laid.touched[used]],
         (film[grid.zone] * contact.shares)[used],
         grid.area[used],
-        contact.laid.pressure[used],
         grid.sole[used],
         np.full(len(used), tread),
         np.full(len(used), number),
@@ -194,8 +201,8 @@ def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int, tread: fl
 def _joined(parts: Sequence[Marks], carried: CarriedMass) -> Marks:
     first = np.cumsum([0, *(len(part.position) for part in parts)])
     none, places, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.intp)
-    nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, none, places, none, numbers)
-    names = ("position", "birth", "mass", "area", "pressure", "sole", "tread", "step")
+    nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, places, none, numbers)
+    names = ("position", "birth", "mass", "area", "sole", "tread", "step")
     whole: Any = {name: np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names}
     faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
     return Marks(faces=np.concatenate([nothing.faces, *faces]), **whole, carried=carried)

@@ -49,8 +49,7 @@ def test_what_is_picked_up_is_left_shed_or_still_carried_whatever_a_sole_does():
             Meeting(float(frame), chance.random(4)) if chance.random() < 0.7 else Meeting(frame, shed=chance.random())
             for frame in range(30)
         ]
-        start = MUD.most * chance.random(4)
-        giving, carried = carry(meetings, MUD, AREAS, start)
+        giving, carried = carry(meetings, MUD, AREAS)
         assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
         left = sum(
             film @ (AREAS * one.shares) for film, one in zip(giving, meetings, strict=True) if one.shares is not None

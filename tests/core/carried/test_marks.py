@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid
-from softground_addon.core.carried.marks import marks_of
+from softground_addon.core.carried.marks import _pieces, marks_of
 from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.terrain import MeshTerrain
@@ -107,6 +107,16 @@ def test_marks_lie_on_the_floor_under_the_feet_that_press_them():
         heel, toes = along < 0.05, along > 0.22
         assert found.birth[of_step][heel].min() < found.birth[of_step][toes].min()
     assert found.birth.min() >= loads.motion.frames[0]
+
+
+def test_a_sole_that_slides_on_leaves_a_mark_for_each_of_its_lengths():
+    hard, slid = np.ones(40, bool), np.linspace(0.0, 3.5, 40)
+    hard[:4] = False
+    pieces = list(_pieces(hard, slid))
+    assert [piece.start for piece in pieces[1:]] == [piece.stop for piece in pieces[:-1]]
+    assert (pieces[0].start, pieces[-1].stop) == (4, 40)
+    assert len(pieces) == 4
+    assert [len(list(_pieces(hard, 0.0 * slid))), len(list(_pieces(~hard, slid)))] == [1, 1]
 
 
 def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
