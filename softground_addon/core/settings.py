@@ -154,6 +154,8 @@ class BakeSettings(SceneUnits):
         The scene's, where a ground is to be made; None without one.
     hard_grounds : tuple of ObjectName
         Objects that soles stand on without a print.
+    carve : bool
+        Whether bodies carve deep ground where their feet are let down.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -188,11 +190,17 @@ class BakeSettings(SceneUnits):
     weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
+    carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
 
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
         return spacing_of(self.cell_size_m, self.relief)
+
+    @property
+    def carves(self) -> bool:
+        """True if bodies may carve the ground: their feet are let down into it, and both are shown."""
+        return self.carve and self.output == "BOTH" and self.response is not None and self.response.grounding is not None
 
     @property
     def fineness(self) -> Fineness:

@@ -35,6 +35,7 @@ def build(
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
+    carves: Mapping[int, Footprint] | None = None,
 ) -> dict[str, Any]:
     """The whole report of a bake, ready for JSON.
 
@@ -66,6 +67,8 @@ def build(
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
         From `core.events.events`.
+    carves : mapping of int to Footprint, optional
+        Of the `BakeRecord`.
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
@@ -90,6 +93,10 @@ def build(
         "self_check": [finding.as_dict() for finding in worst_first(findings)],
         "warnings": [finding.text for finding in worst_first(findings)],
     }
+    if carves:
+        lying = [carves[step.index] for step in steps if step.left and step.index in carves]
+        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in lying)
+        report["carved"] = _carved(lying)
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:
@@ -100,6 +107,18 @@ def build(
     if forces is not None:
         report["forces"] = dict(forces)
     return report
+
+
+def _carved(carves: Sequence[Footprint]) -> dict[str, dict[str, float]]:
+    """Volumes that each character cut, packed into walls, left loose, and found no place for [m³]."""
+    volumes: dict[str, dict[str, float]] = {}
+    for carve in carves:
+        packed = carve.compressed_m3 - carve.rim_m3 - carve.unplaced_rim_m3
+        of_step = (carve.compressed_m3, packed, carve.rim_m3, carve.unplaced_rim_m3)
+        sums = volumes.setdefault(carve.character, {})
+        for name, volume in zip(("cut_m3", "packed_m3", "loose_m3", "unplaced_m3"), of_step, strict=True):
+            sums[name] = sums.get(name, 0.0) + volume
+    return volumes
 
 
 def _step(editable: EditableStep) -> dict[str, Any]:

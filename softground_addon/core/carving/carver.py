@@ -1,0 +1,194 @@
+"""Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
+
+Over the pressed ground T, every cell keeps the lowest underside K that passed it and the loose matter l on it: what
+stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. Of what stood, a part is packed into
+the wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
+are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.material import GroundMaterial
+from ..ground.surfaces import SurfaceRecord
+from ..pressing.repose import slid
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOLERANCE = 1e-3
+"""Skin that is less deep in the ground does not cut it [m]."""
+ROUNDING = 1e-12
+"""Heights below zero by no more than this are zero [m]."""
+REACH = 0.07
+"""How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
+
+
+@dataclass(frozen=True)
+class Walls:
+    """How ground stands that was cut.
+
+    Attributes
+    ----------
+    packing : float
+        Part of the cut volume that is packed into the wall.
+    strength : float
+        Height up to which a wall stands [m]: Hc = 4·c/(rho·g)·tan(45° + phi/2) (Terzaghi 1943, a vertical cut).
+    repose : float
+        Angle of repose of loose matter [rad].
+    """
+
+    packing: float
+    strength: float
+    repose: float
+
+    @classmethod
+    def of(cls, surface: SurfaceRecord, material: GroundMaterial, gravity: float) -> Walls:
+        """The walls of a ground, under a gravity [m/s²].
+
+        Examples
+        --------
+        >>> from softground_addon.core.ground.surfaces import SURFACES
+        >>> material = GroundMaterial(youngs_modulus=1e5, poisson_ratio=0.1, characteristic_time=0.2)
+        >>> [round(Walls.of(SURFACES[name], material, 9.81).strength, 2) for name in ("snow", "sand", "mud")]
+        [1.02, 0.0, 0.62]
+        """
+        repose = material.repose_angle or np.radians(surface.thrown.repose)
+        cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
+        return cls(surface.wall_packing, cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0, repose)
+
+
+@dataclass
+class CarvedCells:
+    """A window of ground that a body is in; `press`, `cut`, `pack` and `slide` change it and count what they do.
+
+    Attributes
+    ----------
+    cell_size : float
+        Side of a cell [m].
+    terrain : (rows, columns) float array
+        Height of the undisturbed ground [m].
+    closed : (rows, columns) bool array
+        Cells that nothing is cut from or laid on: off the ground, or under a sole that presses.
+    pressed : (rows, columns) float array
+        Height of the pressed ground T, with its rims [m].
+    lowest : (rows, columns) float array
+        Lowest underside K so far [m], infinite where none passed.
+    loose : (rows, columns) float array
+        Height of the loose matter [m].
+    cut_height, packed, unplaced : float
+        Sums of the heights that were cut of what stood, packed, and found no place around [m].
+    """
+
+    cell_size: float
+    terrain: Array
+    closed: Mask
+    pressed: Array
+    lowest: Array
+    loose: Array
+    cut_height: float = 0.0
+    packed: float = 0.0
+    unplaced: float = 0.0
+
+    @property
+    def standing(self) -> Array:
+        """Height of what stands, (rows, columns) [m]."""
+        return np.minimum(self.pressed, self.lowest)
+
+    @property
+    def surface(self) -> Array:
+        """Height of the ground, (rows, columns) [m]."""
+        return self.standing + self.loose
+
+    def press(self, pressed: Array) -> None:
+        """Go on to the pressed ground of a later moment, (rows, columns) [m]; rims rise on carved ground as loose matter."""
+        before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
+        self.loose += np.maximum(after - before, 0.0)
+        self.pressed = pressed
+
+    def cut(self, underside: Array, way: Array, packing: float) -> None:
+        """Cut the ground to a body's underside.
+
+        Parameters
+        ----------
+        underside : (rows, columns) float array
+            Lowest surface of the body over each cell [m], infinite where there is none.
+        way : (2,) float array
+            Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
+        packing : float
+            See `Walls`.
+        """
+        standing = self.standing
+        depth = standing + self.loose - underside
+        depth[self.closed | (depth < TOLERANCE)] = 0.0
+        if not depth.any():
+            return
+        of_loose = np.minimum(self.loose, depth)
+        of_standing = depth - of_loose
+        self.loose -= of_loose
+        self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
+        self.cut_height += float(of_standing.sum())
+        self.packed += packing * float(of_standing.sum())
+        thrown = of_loose + (1.0 - packing) * of_standing
+        free = ~self.closed & (underside > self.surface - TOLERANCE)
+        spread = np.where(free, _around(thrown, way, self.cell_size), 0.0)
+        if (there := spread.sum()) > 0:
+            self.loose += spread * (thrown.sum() / there)
+        else:
+            self.unplaced += float(thrown.sum())
+
+    def pack(self, under: Mask) -> None:
+        """Pack the loose matter under soles that press."""
+        self.packed += float(self.loose[under].sum())
+        self.loose[under] = 0.0
+
+    def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
+        """Let slide what is too steep; a body that stands in the ground holds it.
+
+        Parameters
+        ----------
+        walls : Walls
+        body : (rows, columns) bool array
+            Cells with a body in the ground.
+        corner : tuple of int
+            Row and column of the first cell in the plane.
+        sweeps : int
+            Most sweeps (see `repose.slid`).
+        """
+        standing = self.standing
+        before = standing + self.loose
+        change = slid(
+            before - self.terrain,
+            np.zeros_like(before),
+            self.terrain,
+            angle=walls.repose,
+            cell_size=self.cell_size,
+            fixed=self.closed | body,
+            walls=(standing, walls.strength),
+            corner=corner,
+            sweeps=sweeps,
+        ) - (before - self.terrain)
+        loose = self.loose + change
+        fallen = loose < -ROUNDING
+        self.lowest[fallen] = (standing + loose)[fallen]
+        self.loose = np.maximum(loose, 0.0)
+
+
+def _around(thrown: Array, way: Array, cell_size: float) -> Array:
+    """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
+    length = float(np.hypot(*way))
+    ahead = np.asarray(way) / length * (REACH / cell_size) if length > 0 else np.zeros(2)
+    reach, (rows, columns) = max(REACH / cell_size, 1.5), thrown.shape
+
+    def along(count: int, shift: float) -> Array:
+        place = np.arange(count)
+        weights: Array = np.maximum(0.0, 1.0 - np.abs(place[:, None] - place - shift) / reach)
+        return weights
+
+    shifts = ((0.0, 0.0), tuple(ahead))
+    return np.asarray(sum(along(rows, up) @ thrown @ along(columns, right).T for right, up in shifts))

@@ -1,0 +1,318 @@
+"""The carves of a shot: what bodies cut out of deep ground beside their prints, frame by frame, as footprints.
+
+A carve is recorded per step, from the middle of one swing of its sole to the middle of the next. Like any footprint it
+adds to the others: its compression is how far what stands lies below the pressed ground, its rim the loose matter. Both
+may fall again, as where a sole presses what a shin had cut before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.deep_ground import wading
+from ..ground.surfaces import find
+from ..ground.soft_ground import SoftGround
+from ..ground.sparse_grid import SparseGrid, Window
+from ..legs.grounding import Response
+from ..motion.motion import CharacterMotion
+from ..numerics.interpolation import cubic
+from ..numerics.slices import Slices, sliced
+from ..pressing.ground_cells import UndisturbedCells
+from ..pressing.repose import SWEEPS_TO_REST, slide_reach
+from ..record.footprints import QUANTUM, Footprint, FootprintRecorder, quantised
+from ..record.record import BakeRecord
+from ..soles.undersides import lowest_surface
+from .carver import REACH, CarvedCells, Walls
+from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+SUBSTEPS = 4
+"""Cuts in a frame."""
+MOST_POSES = 32
+"""Most poses of a body in a frame; up to there, nothing in the ground moves further than a cell from one to the next."""
+BERM = 0.15
+"""Height above the undisturbed ground up to which skin may meet loose matter [m]."""
+SWEEPS = 16
+"""Sweeps in which loose matter slides after each frame (`repose.slid`); the rest goes on in the next."""
+LEAST = round(1e-3 / QUANTUM)
+"""Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
+FRAMES_AT_ONCE = 16
+"""Frames whose skin is worked out together."""
+
+
+@dataclass
+class _Step:
+    """A step and what its leg has carved so far."""
+
+    footprint: Footprint
+    is_deep: bool
+    recorder: FootprintRecorder
+    cut: float = 0.0
+    packed: float = 0.0
+    unplaced: float = 0.0
+
+    def distance(self, frame: float) -> tuple[float, float]:
+        """How far a frame is from its contact; of two at once, the later one is nearer."""
+        footprint = self.footprint
+        away = max(footprint.start_frame - frame, frame - footprint.end_frame, 0.0)
+        return away, -footprint.start_frame
+
+
+@sliced
+def with_carves(
+    left: BakeRecord,
+    responses: Iterable[tuple[CharacterMotion, Response]],
+    skins: Mapping[str, WornSkin],
+    ground: SoftGround,
+    surface: str,
+) -> Slices[BakeRecord]:
+    """A record with what the bodies of a shot carve; the same where nobody wades.
+
+    Parameters
+    ----------
+    left : BakeRecord
+    responses : iterable of (CharacterMotion, Response)
+    skins : mapping of str to WornSkin
+        By the names of the characters, of those whose skin was read.
+    ground : SoftGround
+    surface : str
+        What it is made of.
+    """
+    prints = {step.index: step.left for step in left.steps if step.left is not None and not step.is_copy}
+    waders = {print.character for print in prints.values() if _is_deep(print)}
+    responded = [
+        (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
+        for motion, response in responses
+        if motion.name in skins.keys() & waders
+    ]
+    if not responded:
+        return left
+    walls = Walls.of(find(surface), ground.material, ground.gravity)
+    return replace(left, carves=(yield from carves_of.slices(responded, prints, ground, walls)))
+
+
+@sliced
+def carves_of(
+    skins: Sequence[tuple[str, Sequence[str], RespondedSkin]],
+    footprints: Mapping[int, Footprint],
+    ground: SoftGround,
+    walls: Walls,
+) -> Slices[dict[int, Footprint]]:
+    """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
+
+    Parameters
+    ----------
+    skins : sequence of (str, sequence of str, RespondedSkin)
+        Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
+    footprints : mapping of int to Footprint
+        The prints that the ground is made from, at least one, by their numbers.
+    ground : SoftGround
+    walls : Walls
+    """
+    some = next(iter(footprints.values()))
+    steps = {
+        number: _Step(footprint, _is_deep(footprint), FootprintRecorder(some.cell_size, some.frame_step))
+        for number, footprint in footprints.items()
+    }
+    carving = _Carving(ground, walls, some.cell_size, list(steps.values()))
+    frames = skins[0][2].frames
+    moving = [_poses(skin) for _, _, skin in skins]
+    owners: dict[tuple[str, int], _Step] = {}
+    carving.press(-np.inf, float(frames[0]))
+    for since, frame in zip(frames[:-1], frames[1:], strict=True):
+        yield
+        carving.press(float(since), float(frame))
+        for (name, soles, skin), poses in zip(skins, moving, strict=True):
+            around = next(poses)
+            for sole, triangles in skin.triangles.items():
+                wanted = [
+                    each
+                    for each in steps.values()
+                    if each.footprint.character == name
+                    and (sole == NO_SOLE or each.footprint.sole == soles[sole])
+                ]
+                if not wanted:
+                    continue
+                owner = min(wanted, key=lambda each: each.distance(frame))  # noqa: B023
+                if (before := owners.get((name, sole), owner)) is not owner:
+                    carving.settle(before, float(frame))
+                owners[name, sole] = owner
+                if owner.is_deep:
+                    carving.carve(owner, around, triangles, float(frame))
+    for each in steps.values():
+        yield
+        carving.settle(each, float(frames[-1]))
+    return {number: carving.footprint(each) for number, each in steps.items() if each.recorder.frames}
+
+
+def _is_deep(footprint: Footprint) -> bool:
+    """True if a foot sank beyond its ankle."""
+    made_by = footprint.pressed_by
+    if made_by is None or made_by.pressing.sole.prop is not None:
+        return False
+    return bool(wading(footprint.max_depth_m, made_by.pressing.sole.length) > 0)
+
+
+def _poses(skin: RespondedSkin) -> Iterator[Array]:
+    """The vertices at the two frames of each span and at their neighbours, (4, V, 3) [m], span by span."""
+    last = len(skin.frames) - 1
+    for first in range(0, last, FRAMES_AT_ONCE):
+        end = min(first + FRAMES_AT_ONCE, last)
+        places = skin.at(np.arange(first - 1, end + 2).clip(0, last))
+        for number in range(end - first):
+            yield places[number : number + 4]
+
+
+class _Carving:
+    """The ground of a shot as it is carved."""
+
+    def __init__(self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[_Step]) -> None:
+        self._walls, self._cell_size, self._steps = walls, cell_size, steps
+        self._undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self._layer_depth = ground.material.layer_depth
+        self._pressed = SparseGrid(cell_size, channels=1)
+        self._lowest = SparseGrid(cell_size, channels=1, fill=np.inf)
+        self._loose = SparseGrid(cell_size, channels=1)
+        self._recorded = SparseGrid(cell_size, channels=2)
+        self._contact = SparseGrid(cell_size, channels=1)
+
+    def press(self, since: float, frame: float) -> None:
+        """Go on to the ground as soles have pressed it by a frame: they pack loose matter, and press what was carved."""
+        self._contact = SparseGrid(self._cell_size, channels=1)
+        for step in self._steps:
+            footprint = step.footprint
+            window = footprint.window
+            change = _change(footprint, since, frame)
+            touching = (footprint.contact_start[:] <= frame) & (footprint.contact_end[:] > since)
+            if change is None and not touching.any():
+                continue
+            contact = self._contact.read(window)[0]
+            contact.reshape(-1)[footprint.contact_cells[:][touching]] = 1.0
+            self._contact.write(window, contact[None])
+            cells = self._cells(window)
+            if change is not None:
+                self._pressed.write(window, self._pressed.read(window) + change)
+                cells.press(cells.pressed + change)
+            cells.pack(contact > 0)
+            self._keep(step, window, cells, frame, LEAST)
+
+    def carve(self, step: _Step, around: Array, triangles: Indices, frame: float) -> None:
+        """Cut the ground to a part of a body over the frame before, from its vertices (4, V, 3) around that span."""
+        used, triangles = np.unique(triangles, return_inverse=True)
+        triangles, around = triangles.reshape(-1, 3), around[:, used]
+        both = around[1:3]
+        box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
+        heights = self._undisturbed.surface(box).heights
+        under = heights[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
+        low = (both[..., 2] < under + BERM).any(axis=0)
+        triangles = triangles[low[triangles].any(axis=1)]
+        if not len(triangles):
+            return
+        corners, way = both[:, np.unique(triangles)], both[1, low] - both[0, low]
+        margin = ceil(2 * REACH / self._cell_size) + 2
+        window = Window.around(
+            corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1)), self._cell_size
+        ).expanded(margin)
+        cells = self._cells(window)
+        distance = np.linalg.norm(way, axis=1)
+        poses = ceil(min(max(float(distance.max()) / self._cell_size, 1.0), MOST_POSES) / SUBSTEPS)
+        ahead = way[distance.argmax(), :2]
+        origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
+        underside = np.empty(0)
+        for substep in range(SUBSTEPS):
+            share = (substep + np.arange(1, poses + 1) / poses) / SUBSTEPS
+            vertices = cubic(around, 1.0 + share)
+            numbers = triangles + len(used) * np.arange(poses)[:, None, None]
+            underside = lowest_surface(
+                vertices.reshape(-1, 3), numbers.reshape(-1, 3), origin, cells.loose.shape, self._cell_size
+            )
+            underside = np.maximum(underside, cells.terrain - self._layer_depth)
+            cells.cut(underside, ahead, self._walls.packing)
+        body = underside < cells.surface + self._cell_size
+        cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
+        self._keep(step, window, cells, frame, LEAST)
+
+    def settle(self, step: _Step, frame: float) -> None:
+        """Let come to rest what a step has carved, and record all of it."""
+        if not step.recorder.frames:
+            return
+        window = step.recorder.window
+        cells = self._cells(window)
+        surface = cells.surface
+        reach = slide_reach(surface - cells.terrain, np.zeros_like(surface), self._walls.repose, self._cell_size)
+        window = window.expanded(reach)
+        cells = self._cells(window)
+        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
+        self._keep(step, window, cells, frame, 1)
+
+    def footprint(self, step: _Step) -> Footprint:
+        """What a step has carved."""
+        footprint, area = step.footprint, self._cell_size**2
+        frames = step.recorder.frames
+        return step.recorder.footprint(
+            character=footprint.character,
+            sole=footprint.sole,
+            start_frame=min(frames),
+            end_frame=max(frames),
+            position=footprint.position,
+            heading=footprint.heading,
+            area_m2=0.0,
+            peak_force_n=0.0,
+            compressed_m3=step.cut * area,
+            rim_m3=(step.cut - step.packed - step.unplaced) * area,
+            unplaced_rim_m3=step.unplaced * area,
+            load_frames=np.zeros(0),
+            load_n=np.zeros(0),
+        )
+
+    def _cells(self, window: Window) -> CarvedCells:
+        surface = self._undisturbed.surface(window)
+        around = self._contact.read(window.expanded(1))[0] > 0
+        pressing = np.zeros(surface.heights.shape, bool)
+        for rows in (slice(0, -2), slice(1, -1), slice(2, None)):
+            for columns in (slice(0, -2), slice(1, -1), slice(2, None)):
+                pressing |= around[rows, columns]
+        terrain = np.nan_to_num(surface.heights)
+        return CarvedCells(
+            cell_size=self._cell_size,
+            terrain=terrain,
+            closed=pressing | ~surface.bears,
+            pressed=terrain + self._pressed.read(window)[0],
+            lowest=self._lowest.read(window)[0],
+            loose=self._loose.read(window)[0],
+        )
+
+    def _keep(self, step: _Step, window: Window, cells: CarvedCells, frame: float, least: int) -> None:
+        """Write cells back, and record what of their changes comes to the least [QUANTUM]."""
+        step.cut += cells.cut_height
+        step.packed += cells.packed
+        step.unplaced += cells.unplaced
+        self._lowest.write(window, cells.lowest[None])
+        self._loose.write(window, cells.loose[None])
+        carved = np.stack([np.maximum(cells.pressed - cells.lowest, 0.0), cells.loose])
+        before = self._recorded.read(window)
+        change = quantised(carved) - before.astype(np.int64)
+        change[:, (np.abs(change) < least).all(axis=0)] = 0
+        if change.any():
+            step.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
+            self._recorded.write(window, before + change)
+
+
+def _change(footprint: Footprint, since: float, frame: float) -> Array | None:
+    """How far a print raised the ground between two frames, (rows, columns) of its window [m]; None if nowhere."""
+    raised, window = np.zeros(footprint.window.cells), footprint.window
+    moves = False
+    for changes, sign in ((footprint.compression, -1.0), (footprint.rim, 1.0)):
+        first, last = np.searchsorted(changes.frames, (since + 1e-6, frame + 1e-6))
+        part = slice(changes.first[first], changes.first[last])
+        moves |= part.start < part.stop
+        raised += sign * np.bincount(changes.cells[part], changes.amounts[part], window.cells)
+    return (raised * QUANTUM).reshape(window.rows, window.columns) if moves else None
