@@ -9,7 +9,7 @@ are higher than their cohesion holds: of dry sand all, of snow and mud hardly an
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, tan
+from math import ceil, pi, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,11 @@ class Walls:
         repose = material.repose_angle or np.radians(surface.thrown.repose)
         cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
         return cls(surface.wall_packing, cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0, repose)
+
+    def reach(self, surface: Array, loose: Array, cell_size: float) -> int:
+        """Number of cells around a window that what slides may spread over, from its heights (rows, columns) [m]."""
+        drop = min(np.ptp(surface), loose.max() + max(np.ptp(surface) - self.strength, 0.0))
+        return ceil(drop / (tan(self.repose) * cell_size)) + 1
 
 
 @dataclass

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
-from ..ground.surfaces import find
+from ..ground.hard_ground import bare
+from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
+from ..ground.surfaces import find
 from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
 from ..numerics.interpolation import cubic
 from ..numerics.slices import Slices, sliced
-from ..pressing.ground_cells import UndisturbedCells
-from ..pressing.repose import SWEEPS_TO_REST, slide_reach
+from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, FootprintRecorder, quantised
 from ..record.record import BakeRecord
 from ..soles.undersides import lowest_surface
@@ -34,12 +36,13 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-SUBSTEPS = 4
-"""Cuts in a frame."""
+CUTS = 4
+"""Most cuts in a frame."""
+POSES_ALONG_SOLE = 14
+"""Nothing in the ground moves further from one pose to the next than this part of a sole, or a cell: 2 cm, from which
+the outline of a shank has scallops of a millimetre."""
 MOST_POSES = 32
-"""Most poses of a body in a frame; up to there, nothing in the ground moves further than a cell from one to the next."""
-BERM = 0.15
-"""Height above the undisturbed ground up to which skin may meet loose matter [m]."""
+"""Most poses of a body in a frame."""
 SWEEPS = 16
 """Sweeps in which loose matter slides after each frame (`repose.slid`); the rest goes on in the next."""
 LEAST = round(1e-3 / QUANTUM)
@@ -58,6 +61,24 @@ class _Step:
     cut: float = 0.0
     packed: float = 0.0
     unplaced: float = 0.0
+
+    @cached_property
+    def begins(self) -> float:
+        """Scene frame from which its print may change."""
+        changes = (self.footprint.compression, self.footprint.rim)
+        return min(self.footprint.start_frame, *(float(each.frames.min(initial=np.inf)) for each in changes)) - 1.0
+
+    @cached_property
+    def ends(self) -> float:
+        """Scene frame from which on its print stays as it is."""
+        changes = (self.footprint.compression, self.footprint.rim)
+        return max(self.footprint.end_frame, *(float(each.frames.max(initial=-np.inf)) for each in changes)) + 1.0
+
+    @property
+    def spacing(self) -> float:
+        """Distance from one pose of its leg to the next [m]."""
+        made_by = self.footprint.pressed_by
+        return max(self.footprint.cell_size, made_by.pressing.sole.length / POSES_ALONG_SOLE if made_by else 0.0)
 
     def distance(self, frame: float) -> tuple[float, float]:
         """How far a frame is from its contact; of two at once, the later one is nearer."""
@@ -176,7 +197,9 @@ class _Carving:
 
     def __init__(self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[_Step]) -> None:
         self._walls, self._cell_size, self._steps = walls, cell_size, steps
-        self._undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
+        self._highest = 0.0
+        """Highest surface over the undisturbed ground so far [m]."""
         self._layer_depth = ground.material.layer_depth
         self._pressed = SparseGrid(cell_size, channels=1)
         self._lowest = SparseGrid(cell_size, channels=1, fill=np.inf)
@@ -189,6 +212,8 @@ class _Carving:
         self._contact = SparseGrid(self._cell_size, channels=1)
         for step in self._steps:
             footprint = step.footprint
+            if not step.begins <= frame or since >= step.ends:
+                continue
             window = footprint.window
             change = _change(footprint, since, frame)
             touching = (footprint.contact_start[:] <= frame) & (footprint.contact_end[:] > since)
@@ -210,35 +235,40 @@ class _Carving:
         triangles, around = triangles.reshape(-1, 3), around[:, used]
         both = around[1:3]
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
-        heights = self._undisturbed.surface(box).heights
-        under = heights[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low = (both[..., 2] < under + BERM).any(axis=0)
+        terrain = self._undisturbed.heights(box)
+        over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
+        low = (over < self._highest).any(axis=0)
         triangles = triangles[low[triangles].any(axis=1)]
         if not len(triangles):
             return
-        corners, way = both[:, np.unique(triangles)], both[1, low] - both[0, low]
+        corners = both[:, np.unique(triangles), :2]
         margin = ceil(2 * REACH / self._cell_size) + 2
-        window = Window.around(
-            corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1)), self._cell_size
-        ).expanded(margin)
+        window = Window.around(corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), self._cell_size).expanded(margin)
         cells = self._cells(window)
+        pressing = cells.closed[window.cells_under(both[..., 0], both[..., 1], self._cell_size)].all(axis=0)
+        triangles = triangles[~pressing[triangles].all(axis=1)]
+        if not len(triangles):
+            return
+        way = both[1, low] - both[0, low]
         distance = np.linalg.norm(way, axis=1)
-        poses = ceil(min(max(float(distance.max()) / self._cell_size, 1.0), MOST_POSES) / SUBSTEPS)
-        ahead = way[distance.argmax(), :2]
-        origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
+        ahead, poses = way[distance.argmax(), :2], ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
+        cuts = min(poses, CUTS)
         underside = np.empty(0)
-        for substep in range(SUBSTEPS):
-            share = (substep + np.arange(1, poses + 1) / poses) / SUBSTEPS
-            vertices = cubic(around, 1.0 + share)
-            numbers = triangles + len(used) * np.arange(poses)[:, None, None]
-            underside = lowest_surface(
-                vertices.reshape(-1, 3), numbers.reshape(-1, 3), origin, cells.loose.shape, self._cell_size
-            )
+        for part in np.array_split(np.arange(1, poses + 1) / poses, cuts):
+            underside = self._underside(cubic(around, 1.0 + part), triangles, window)
             underside = np.maximum(underside, cells.terrain - self._layer_depth)
             cells.cut(underside, ahead, self._walls.packing)
         body = underside < cells.surface + self._cell_size
         cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
+        self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
         self._keep(step, window, cells, frame, LEAST)
+
+    def _underside(self, poses: Array, triangles: Indices, window: Window) -> Array:
+        """Lowest surface of some poses (N, V, 3) over the cells of a window."""
+        origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
+        numbers = triangles + poses.shape[1] * np.arange(len(poses))[:, None, None]
+        shape = window.rows, window.columns
+        return lowest_surface(poses.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
 
     def settle(self, step: _Step, frame: float) -> None:
         """Let come to rest what a step has carved, and record all of it."""
@@ -246,9 +276,7 @@ class _Carving:
             return
         window = step.recorder.window
         cells = self._cells(window)
-        surface = cells.surface
-        reach = slide_reach(surface - cells.terrain, np.zeros_like(surface), self._walls.repose, self._cell_size)
-        window = window.expanded(reach)
+        window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
         cells = self._cells(window)
         cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
         self._keep(step, window, cells, frame, 1)
@@ -300,10 +328,17 @@ class _Carving:
         carved = np.stack([np.maximum(cells.pressed - cells.lowest, 0.0), cells.loose])
         before = self._recorded.read(window)
         change = quantised(carved) - before.astype(np.int64)
-        change[:, (np.abs(change) < least).all(axis=0)] = 0
-        if change.any():
-            step.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
-            self._recorded.write(window, before + change)
+        counts = (np.abs(change) >= least).any(axis=0)
+        rows, columns = (np.flatnonzero(counts.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return
+        change *= counts
+        part = Window(
+            window.column + int(columns[0]), window.row + int(rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+        )
+        change = change[:, *window.slices(part)]
+        step.recorder.add(frame, part, change, np.zeros(change.shape[1:], bool))
+        self._recorded.write(part, self._recorded.read(part) + change)
 
 
 def _change(footprint: Footprint, since: float, frame: float) -> Array | None:

@@ -14,6 +14,7 @@ import numpy as np
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
+from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from ..record.typical_depth import typical_of
 
