@@ -188,12 +188,15 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
     length = float(np.hypot(*way))
     ahead = np.asarray(way) / length * (REACH / cell_size) if length > 0 else np.zeros(2)
-    reach, (rows, columns) = max(REACH / cell_size, 1.5), thrown.shape
+    reach = max(REACH / cell_size, 1.5)
+    rows, columns = (np.flatnonzero(thrown.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (np.arange(cells[0], cells[-1] + 1) for cells in (rows, columns))
+    of_some = thrown[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
-    def along(count: int, shift: float) -> Array:
-        place = np.arange(count)
-        weights: Array = np.maximum(0.0, 1.0 - np.abs(place[:, None] - place - shift) / reach)
-        return weights
+    def along(count: int, cells: Array, shift: float) -> Array:
+        return np.maximum(0.0, 1.0 - np.abs(np.arange(count)[:, None] - cells - shift) / reach)
 
-    shifts = ((0.0, 0.0), tuple(ahead))
-    return np.asarray(sum(along(rows, up) @ thrown @ along(columns, right).T for right, up in shifts))
+    laid = np.zeros_like(thrown)
+    for right, up in ((0.0, 0.0), ahead):
+        laid += along(len(thrown), rows, up) @ of_some @ along(thrown.shape[1], columns, right).T
+    return laid

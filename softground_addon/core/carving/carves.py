@@ -43,8 +43,8 @@ POSES_ALONG_SOLE = 14
 the outline of a shank has scallops of a millimetre."""
 MOST_POSES = 32
 """Most poses of a body in a frame."""
-SWEEPS = 16
-"""Sweeps in which loose matter slides after each frame (`repose.slid`); the rest goes on in the next."""
+SLIDES_EVERY, SWEEPS = 2, 8
+"""Loose matter slides after every so many frames, in so many sweeps (`repose.slid`); the rest goes on in the next."""
 LEAST = round(1e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
 FRAMES_AT_ONCE = 16
@@ -73,6 +73,12 @@ class _Step:
         """Scene frame from which on its print stays as it is."""
         changes = (self.footprint.compression, self.footprint.rim)
         return max(self.footprint.end_frame, *(float(each.frames.max(initial=-np.inf)) for each in changes)) + 1.0
+
+    @cached_property
+    def contact(self) -> tuple[Indices, Array, Array]:
+        """Cells that its sole touched, and from when to when."""
+        footprint = self.footprint
+        return footprint.contact_cells[:], footprint.contact_start[:], footprint.contact_end[:]
 
     @property
     def spacing(self) -> float:
@@ -163,7 +169,7 @@ def carves_of(
                 if not wanted:
                     continue
                 owner = min(wanted, key=lambda each: each.distance(frame))  # noqa: B023
-                if (before := owners.get((name, sole), owner)) is not owner:
+                if (before := owners.get((name, sole), owner)) is not owner and sole != NO_SOLE:
                     carving.settle(before, float(frame))
                 owners[name, sole] = owner
                 if owner.is_deep:
@@ -216,11 +222,12 @@ class _Carving:
                 continue
             window = footprint.window
             change = _change(footprint, since, frame)
-            touching = (footprint.contact_start[:] <= frame) & (footprint.contact_end[:] > since)
+            touched, start, end = step.contact
+            touching = (start <= frame) & (end > since)
             if change is None and not touching.any():
                 continue
             contact = self._contact.read(window)[0]
-            contact.reshape(-1)[footprint.contact_cells[:][touching]] = 1.0
+            contact.reshape(-1)[touched[touching]] = 1.0
             self._contact.write(window, contact[None])
             cells = self._cells(window)
             if change is not None:
@@ -258,8 +265,9 @@ class _Carving:
             underside = self._underside(cubic(around, 1.0 + part), triangles, window)
             underside = np.maximum(underside, cells.terrain - self._layer_depth)
             cells.cut(underside, ahead, self._walls.packing)
-        body = underside < cells.surface + self._cell_size
-        cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
+        if round(frame) % SLIDES_EVERY == 0:
+            body = underside < cells.surface + self._cell_size
+            cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
         self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
         self._keep(step, window, cells, frame, LEAST)
 
@@ -303,16 +311,11 @@ class _Carving:
 
     def _cells(self, window: Window) -> CarvedCells:
         surface = self._undisturbed.surface(window)
-        around = self._contact.read(window.expanded(1))[0] > 0
-        pressing = np.zeros(surface.heights.shape, bool)
-        for rows in (slice(0, -2), slice(1, -1), slice(2, None)):
-            for columns in (slice(0, -2), slice(1, -1), slice(2, None)):
-                pressing |= around[rows, columns]
         terrain = np.nan_to_num(surface.heights)
         return CarvedCells(
             cell_size=self._cell_size,
             terrain=terrain,
-            closed=pressing | ~surface.bears,
+            closed=(self._contact.read(window)[0] > 0) | ~surface.bears,
             pressed=terrain + self._pressed.read(window)[0],
             lowest=self._lowest.read(window)[0],
             loose=self._loose.read(window)[0],
