@@ -47,6 +47,8 @@ SLIDES_EVERY, SWEEPS = 2, 8
 """Loose matter slides after every so many frames, in so many sweeps (`repose.slid`); the rest goes on in the next."""
 LEAST = round(1e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
+SWEEPS_AFTER_STEP = 48
+"""The same once the leg is on its way to the next step; at the end of the shot all comes to rest."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -170,13 +172,13 @@ def carves_of(
                     continue
                 owner = min(wanted, key=lambda each: each.distance(frame))  # noqa: B023
                 if (before := owners.get((name, sole), owner)) is not owner and sole != NO_SOLE:
-                    carving.settle(before, float(frame))
+                    carving.settle(before, float(frame), SWEEPS_AFTER_STEP)
                 owners[name, sole] = owner
                 if owner.is_deep:
                     carving.carve(owner, around, triangles, float(frame))
     for each in steps.values():
         yield
-        carving.settle(each, float(frames[-1]))
+        carving.settle(each, float(frames[-1]), SWEEPS_TO_REST)
     return {number: carving.footprint(each) for number, each in steps.items() if each.recorder.frames}
 
 
@@ -278,15 +280,15 @@ class _Carving:
         shape = window.rows, window.columns
         return lowest_surface(poses.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
 
-    def settle(self, step: _Step, frame: float) -> None:
-        """Let come to rest what a step has carved, and record all of it."""
+    def settle(self, step: _Step, frame: float, sweeps: int) -> None:
+        """Let slide what a step has carved, and record all of it."""
         if not step.recorder.frames:
             return
         window = step.recorder.window
         cells = self._cells(window)
         window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
         cells = self._cells(window)
-        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
+        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), sweeps)
         self._keep(step, window, cells, frame, 1)
 
     def footprint(self, step: _Step) -> Footprint:
