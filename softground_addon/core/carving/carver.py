@@ -23,6 +23,9 @@ Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
+UNDER_SOLE = 0.01
+"""The same of a sole that presses: within it the print is what the solver says, and the skin about that [m]; where the
+soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 REACH = 0.07
@@ -79,7 +82,9 @@ class CarvedCells:
     terrain : (rows, columns) float array
         Height of the undisturbed ground [m].
     closed : (rows, columns) bool array
-        Cells that nothing is cut from or laid on: off the ground, or under a sole that presses.
+        Cells that nothing is cut from or laid on: off the ground.
+    contact : (rows, columns) bool array
+        Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
     pressed : (rows, columns) float array
         Height of the pressed ground T, with its rims [m].
     lowest : (rows, columns) float array
@@ -93,6 +98,7 @@ class CarvedCells:
     cell_size: float
     terrain: Array
     closed: Mask
+    contact: Mask
     pressed: Array
     lowest: Array
     loose: Array
@@ -130,7 +136,7 @@ class CarvedCells:
         """
         standing = self.standing
         depth = standing + self.loose - underside
-        depth[self.closed | (depth < TOLERANCE)] = 0.0
+        depth[self.closed | (depth < np.where(self.contact, UNDER_SOLE, TOLERANCE))] = 0.0
         if not depth.any():
             return
         of_loose = np.minimum(self.loose, depth)
@@ -140,17 +146,17 @@ class CarvedCells:
         self.cut_height += float(of_standing.sum())
         self.packed += packing * float(of_standing.sum())
         thrown = of_loose + (1.0 - packing) * of_standing
-        free = ~self.closed & (underside > self.surface - TOLERANCE)
+        free = ~(self.closed | self.contact) & (underside > self.surface - TOLERANCE)
         spread = np.where(free, _around(thrown, way, self.cell_size), 0.0)
         if (there := spread.sum()) > 0:
             self.loose += spread * (thrown.sum() / there)
         else:
             self.unplaced += float(thrown.sum())
 
-    def pack(self, under: Mask) -> None:
+    def pack(self) -> None:
         """Pack the loose matter under soles that press."""
-        self.packed += float(self.loose[under].sum())
-        self.loose[under] = 0.0
+        self.packed += float(self.loose[self.contact].sum())
+        self.loose[self.contact] = 0.0
 
     def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
         """Let slide what is too steep; a body that stands in the ground holds it.
@@ -173,7 +179,7 @@ class CarvedCells:
             self.terrain,
             angle=walls.repose,
             cell_size=self.cell_size,
-            fixed=self.closed | body,
+            fixed=self.closed | self.contact | body,
             walls=(standing, walls.strength),
             corner=corner,
             sweeps=sweeps,

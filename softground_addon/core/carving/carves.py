@@ -235,7 +235,7 @@ class _Carving:
             if change is not None:
                 self._pressed.write(window, self._pressed.read(window) + change)
                 cells.press(cells.pressed + change)
-            cells.pack(contact > 0)
+            cells.pack()
             self._keep(step, window, cells, frame, LEAST)
 
     def carve(self, step: _Step, around: Array, triangles: Indices, frame: float) -> None:
@@ -254,10 +254,6 @@ class _Carving:
         margin = ceil(2 * REACH / self._cell_size) + 2
         window = Window.around(corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), self._cell_size).expanded(margin)
         cells = self._cells(window)
-        pressing = cells.closed[window.cells_under(both[..., 0], both[..., 1], self._cell_size)].all(axis=0)
-        triangles = triangles[~pressing[triangles].all(axis=1)]
-        if not len(triangles):
-            return
         way = both[1, low] - both[0, low]
         distance = np.linalg.norm(way, axis=1)
         ahead, poses = way[distance.argmax(), :2], ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
@@ -317,7 +313,8 @@ class _Carving:
         return CarvedCells(
             cell_size=self._cell_size,
             terrain=terrain,
-            closed=(self._contact.read(window)[0] > 0) | ~surface.bears,
+            closed=~surface.bears,
+            contact=self._contact.read(window)[0] > 0,
             pressed=terrain + self._pressed.read(window)[0],
             lowest=self._lowest.read(window)[0],
             loose=self._loose.read(window)[0],
