@@ -59,7 +59,7 @@ class Walls:
         >>> from softground_addon.core.ground.surfaces import SURFACES
         >>> material = GroundMaterial(youngs_modulus=1e5, poisson_ratio=0.1, characteristic_time=0.2)
         >>> [round(Walls.of(SURFACES[name], material, 9.81).strength, 2) for name in ("snow", "sand", "mud")]
-        [1.02, 0.0, 0.62]
+        [0.92, 0.0, 0.62]
         """
         repose = material.repose_angle or np.radians(surface.thrown.repose)
         cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
@@ -146,7 +146,9 @@ class CarvedCells:
         self.cut_height += float(of_standing.sum())
         self.packed += packing * float(of_standing.sum())
         thrown = of_loose + (1.0 - packing) * of_standing
-        free = ~(self.closed | self.contact) & (underside > self.surface - TOLERANCE)
+        if not thrown.any():
+            return
+        free = ~(self.closed | self.contact) & (underside > self.surface + TOLERANCE)
         spread = np.where(free, _around(thrown, way, self.cell_size), 0.0)
         if (there := spread.sum()) > 0:
             self.loose += spread * (thrown.sum() / there)

@@ -155,7 +155,7 @@ class SurfaceRecord:
         Part of the volume that a leg carves out of deep ground that is packed into the wall: of snow 1 - rho/rho_max
         with 550 kg/m³ of snow packed by hand, of others by eye.
     wall_cohesion : float
-        Cohesion by which such a wall stands [Pa]: of snow that drifts and settles for a day, one metre high; of wet
+        Cohesion by which such a wall stands [Pa]: of snow for walls of 0.9 m; of wet
         sand by capillarity; dry sand has none (by eye, and by the yield stress of mud).
     soaking : Soaking or None
         How it takes up rain: sand, loam and clay, dry; wet sand has had its first rain. None of snow, which takes up
