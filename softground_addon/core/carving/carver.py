@@ -4,6 +4,10 @@ Over the pressed ground T, every cell keeps the lowest underside K that passed i
 stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. Of what stood, a part is packed into
 the wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
+
+References
+----------
+Terzaghi 1943, "Theoretical Soil Mechanics", doi:10.1002/9780470172766: the height of a vertical cut.
 """
 
 from __future__ import annotations
