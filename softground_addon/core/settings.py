@@ -200,7 +200,8 @@ class BakeSettings(SceneUnits):
     @property
     def carves(self) -> bool:
         """True if bodies may carve the ground: their feet are let down into it, and both are shown."""
-        return self.carve and self.output == "BOTH" and self.response is not None and self.response.grounding is not None
+        sinks = self.response is not None and self.response.grounding is not None
+        return self.carve and self.output == "BOTH" and sinks
 
     @property
     def fineness(self) -> Fineness:

@@ -121,7 +121,7 @@ class CarvedCells:
         return self.standing + self.loose
 
     def press(self, pressed: Array) -> None:
-        """Go on to the pressed ground of a later moment, (rows, columns) [m]; rims rise on carved ground as loose matter."""
+        """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground, rims are loose matter."""
         before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
         self.loose += np.maximum(after - before, 0.0)
         self.pressed = pressed
@@ -205,7 +205,7 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     rows, columns = (np.arange(cells[0], cells[-1] + 1) for cells in (rows, columns))
     of_some = thrown[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
-    def along(count: int, cells: Array, shift: float) -> Array:
+    def along(count: int, cells: NDArray[np.intp], shift: float) -> Array:
         return np.maximum(0.0, 1.0 - np.abs(np.arange(count)[:, None] - cells - shift) / reach)
 
     laid = np.zeros_like(thrown)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -88,12 +89,6 @@ class _Step:
         made_by = self.footprint.pressed_by
         return max(self.footprint.cell_size, made_by.pressing.sole.length / POSES_ALONG_SOLE if made_by else 0.0)
 
-    def distance(self, frame: float) -> tuple[float, float]:
-        """How far a frame is from its contact; of two at once, the later one is nearer."""
-        footprint = self.footprint
-        away = max(footprint.start_frame - frame, frame - footprint.end_frame, 0.0)
-        return away, -footprint.start_frame
-
 
 @sliced
 def with_carves(
@@ -115,7 +110,7 @@ def with_carves(
     surface : str
         What it is made of.
     """
-    prints = {step.index: step.left for step in left.steps if step.left is not None and not step.is_copy}
+    prints = {step.index: step.left for step in left.steps if step.left is not None}
     waders = {print.character for print in prints.values() if _is_deep(print)}
     responded = [
         (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
@@ -153,33 +148,50 @@ def carves_of(
     }
     carving = _Carving(ground, walls, some.cell_size, list(steps.values()))
     frames = skins[0][2].frames
-    moving = [_poses(skin) for _, _, skin in skins]
-    owners: dict[tuple[str, int], _Step] = {}
+    bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
     carving.press(-np.inf, float(frames[0]))
-    for since, frame in zip(frames[:-1], frames[1:], strict=True):
+    for number, (since, frame) in enumerate(pairwise(frames.tolist()), start=1):
         yield
-        carving.press(float(since), float(frame))
-        for (name, soles, skin), poses in zip(skins, moving, strict=True):
-            around = next(poses)
-            for sole, triangles in skin.triangles.items():
-                wanted = [
-                    each
-                    for each in steps.values()
-                    if each.footprint.character == name
-                    and (sole == NO_SOLE or each.footprint.sole == soles[sole])
-                ]
-                if not wanted:
-                    continue
-                owner = min(wanted, key=lambda each: each.distance(frame))  # noqa: B023
-                if (before := owners.get((name, sole), owner)) is not owner and sole != NO_SOLE:
-                    carving.settle(before, float(frame), SWEEPS_AFTER_STEP)
-                owners[name, sole] = owner
-                if owner.is_deep:
-                    carving.carve(owner, around, triangles, float(frame))
-    for each in steps.values():
+        carving.press(since, frame)
+        for body in bodies:
+            around = next(body.poses)
+            for step, left, triangles in body.parts(number):
+                if left is not None:
+                    carving.settle(left, frame, SWEEPS_AFTER_STEP)
+                if step.is_deep:
+                    carving.carve(step, around, triangles, frame)
+    for step in steps.values():
         yield
-        carving.settle(each, float(frames[-1]), SWEEPS_TO_REST)
-    return {number: carving.footprint(each) for number, each in steps.items() if each.recorder.frames}
+        carving.settle(step, float(frames[-1]), SWEEPS_TO_REST)
+    return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+
+
+class _Body:
+    """A character's skin, part by part, and the steps that these parts take."""
+
+    def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[_Step]) -> None:
+        self.poses = _poses(skin)
+        own = [step for step in steps if step.footprint.character == name]
+        self._parts = []
+        for sole, triangles in skin.triangles.items():
+            taken = own if sole == NO_SOLE else [step for step in own if step.footprint.sole == soles[sole]]
+            if taken:
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
+
+    def parts(self, number: int) -> Iterator[tuple[_Step, _Step | None, Indices]]:
+        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles."""
+        for sole, taken, nearest, triangles in self._parts:
+            before = nearest[number - 1]
+            has_left = sole != NO_SOLE and before != nearest[number]
+            yield taken[nearest[number]], taken[before] if has_left else None, triangles
+
+
+def _nearest(steps: Sequence[_Step], frames: Array) -> Indices:
+    """Which of the steps each frame is nearest to, (F,)."""
+    spans = np.array([(step.footprint.start_frame, step.footprint.end_frame) for step in steps])
+    away = np.maximum(spans[:, :1] - frames, frames - spans[:, 1:]).clip(min=0.0)
+    nearest: Indices = away.argmin(axis=0)
+    return nearest
 
 
 def _is_deep(footprint: Footprint) -> bool:
@@ -216,7 +228,7 @@ class _Carving:
         self._contact = SparseGrid(cell_size, channels=1)
 
     def press(self, since: float, frame: float) -> None:
-        """Go on to the ground as soles have pressed it by a frame: they pack loose matter, and press what was carved."""
+        """Go on to the ground as soles have pressed it by a frame; they press what was carved, and pack lo"""
         self._contact = SparseGrid(self._cell_size, channels=1)
         for step in self._steps:
             footprint = step.footprint

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +49,8 @@ class WornSkin:
 class _Responding(Recording):
     """A recording whose bones are displaced in the world: `parts` (F, 4, 4) by name, all others as the `body`."""
 
-    parts: Mapping[str, Array] = None  # type: ignore[assignment]
-    body: Array = None  # type: ignore[assignment]
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    body: Array = field(default_factory=lambda: np.eye(4)[None])
 
     @property
     def armature(self) -> Array:
@@ -63,7 +64,7 @@ class _Responding(Recording):
     def of(self, samples: NDArray[np.intp]) -> _Responding:
         """Some of the samples."""
         parts = {name: part[samples] for name, part in self.parts.items()}
-        return replace(super().of(samples), parts=parts, body=self.body[samples])  # type: ignore[return-value]
+        return replace(cast("_Responding", super().of(samples)), parts=parts, body=self.body[samples])
 
 
 class RespondedSkin:
@@ -91,9 +92,7 @@ class RespondedSkin:
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
         body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)
         sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[worn.skin.triangles[:, 0]]]
-        self.triangles = {
-            int(number): worn.skin.triangles[body & (sole == number)] for number in np.unique(sole[body])
-        }
+        self.triangles = {int(number): worn.skin.triangles[body & (sole == number)] for number in np.unique(sole[body])}
 
     def at(self, samples: Indices) -> Array:
         """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""

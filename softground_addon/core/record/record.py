@@ -87,8 +87,9 @@ class BakeRecord:
 
     @property
     def shaping(self) -> list[Footprint]:
-        """All that the ground is made from: the edited footprints, and after them the carves of steps that are there."""
-        return [*self.edited, *(self.carves[step.index] for step in self.steps if step.left and step.index in self.carves)]
+        """All that the ground is made from: the edited footprints, and after them the carves of steps that are left."""
+        carved = [step.index for step in self.steps if step.left and step.index in self.carves]
+        return [*self.edited, *(self.carves[number] for number in carved)]
 
     @property
     def edited(self) -> list[Footprint]:
@@ -221,7 +222,7 @@ def load(content: bytes) -> BakeRecord:
         soles, again = text["soles"], [(number, has_print) for number, has_print in text["pressed_again"]]
         carved = list(text.get("carves", []))
         baked = _count_baked(len(names) - len(carved), again)
-        if any(type(number) is not int or not 0 <= number < baked for number in carved):
+        if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in carved):
             raise ValueError("carves of steps that it does not have")
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)

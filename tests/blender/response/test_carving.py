@@ -23,7 +23,7 @@ def walker(scene, **material):
     armature = shots.walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()
     options = scene.softground
-    options.frame_end, options.sink_feet = FRAMES, True
+    options.frame_end, options.sink_feet, options.pressure = FRAMES, True, "CENTRE_OF_PRESSURE"
     for name, value in material.items():
         setattr(options.material, name, value)
     return armature
@@ -109,6 +109,7 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
 
 def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
     walker(scene)
+    bake(scene)  # which makes the ground
     records = []
     for is_on in (True, False):
         scene.softground.carve = is_on
