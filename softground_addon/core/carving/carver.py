@@ -121,7 +121,7 @@ class CarvedCells:
         return self.standing + self.loose
 
     def press(self, pressed: Array) -> None:
-        """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground, rims are loose matter."""
+        """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
         before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
         self.loose += np.maximum(after - before, 0.0)
         self.pressed = pressed

@@ -228,7 +228,7 @@ class _Carving:
         self._contact = SparseGrid(cell_size, channels=1)
 
     def press(self, since: float, frame: float) -> None:
-        """Go on to the ground as soles have pressed it by a frame; they press what was carved, and pack lo"""
+        """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
         self._contact = SparseGrid(self._cell_size, channels=1)
         for step in self._steps:
             footprint = step.footprint
