@@ -198,17 +198,25 @@ class CarvedCells:
 
 def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
-    length = float(np.hypot(*way))
-    ahead = np.asarray(way) / length * (REACH / cell_size) if length > 0 else np.zeros(2)
-    reach = max(REACH / cell_size, 1.5)
+    reach, length = max(round(REACH / cell_size), 1), float(np.hypot(*way))
+    ahead = np.rint(way[::-1] / length * reach).astype(int) if length > 0 else np.zeros(2, int)
     rows, columns = (np.flatnonzero(thrown.any(axis=axis)) for axis in (1, 0))
-    rows, columns = (np.arange(cells[0], cells[-1] + 1) for cells in (rows, columns))
-    of_some = thrown[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    first, last = np.array((rows[0], columns[0])), np.array((rows[-1], columns[-1])) + 1
+    spread = np.pad(thrown[first[0] : last[0], first[1] : last[1]], 2 * reach)
+    for axis in (0, 1, 0, 1):
+        spread = _box_mean(spread, reach | 1, axis)
+    beyond = 4 * reach
+    laid = np.zeros((thrown.shape[0] + 2 * beyond, thrown.shape[1] + 2 * beyond))
+    for shift in (np.zeros(2, int), ahead):
+        row, column = first + shift + beyond - 2 * reach
+        laid[row : row + len(spread), column : column + spread.shape[1]] += spread
+    return np.where(laid > ROUNDING, laid, 0.0)[beyond:-beyond, beyond:-beyond]
 
-    def along(count: int, cells: NDArray[np.intp], shift: float) -> Array:
-        return np.maximum(0.0, 1.0 - np.abs(np.arange(count)[:, None] - cells - shift) / reach)
 
-    laid = np.zeros_like(thrown)
-    for right, up in ((0.0, 0.0), ahead):
-        laid += along(len(thrown), rows, up) @ of_some @ along(thrown.shape[1], columns, right).T
-    return laid
+def _box_mean(values: Array, width: int, axis: int) -> Array:
+    """Means of values (rows, columns) over an odd number of cells along an axis; beyond their edge there is nothing."""
+    around = [(0, 0), (0, 0)]
+    around[axis] = (width // 2 + 1, width // 2)
+    sums = np.cumsum(np.pad(values, around), axis=axis)
+    after, before = (np.take(sums, np.arange(first, first + values.shape[axis]), axis=axis) for first in (width, 0))
+    return np.asarray((after - before) / width)
