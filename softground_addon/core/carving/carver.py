@@ -30,6 +30,8 @@ TOLERANCE = 1e-3
 UNDER_SOLE = 0.01
 """The same of a sole that presses: within it the print is what the solver says, and the skin about that [m]; where the
 soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+THINNEST = 0.1
+"""Loose matter is laid where it is at least so thick, over its thickest."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 REACH = 0.07
@@ -210,7 +212,7 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     for shift in (np.zeros(2, int), ahead):
         row, column = first + shift + beyond - 2 * reach
         laid[row : row + len(spread), column : column + spread.shape[1]] += spread
-    return np.where(laid > ROUNDING, laid, 0.0)[beyond:-beyond, beyond:-beyond]
+    return np.where(laid > THINNEST * laid.max(), laid, 0.0)[beyond:-beyond, beyond:-beyond]
 
 
 def _box_mean(values: Array, width: int, axis: int) -> Array:

@@ -49,7 +49,7 @@ SLIDES_EVERY, SWEEPS = 2, 8
 LEAST = round(1e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
 SWEEPS_AFTER_STEP = 48
-"""The same once the leg is on its way to the next step; at the end of the shot all comes to rest."""
+"""The same once the leg is on its way to the next step; at the end of the shot, what has no cohesion comes to rest."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -162,7 +162,7 @@ def carves_of(
                     carving.carve(step, around, triangles, frame)
     for step in steps.values():
         yield
-        carving.settle(step, float(frames[-1]), SWEEPS_TO_REST)
+        carving.settle(step, float(frames[-1]), SWEEPS_AFTER_STEP if walls.strength else SWEEPS_TO_REST)
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
 
 
