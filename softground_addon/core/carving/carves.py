@@ -22,6 +22,7 @@ from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
 from ..ground.surfaces import find
+from ..ground.variation import VariationTiles
 from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
 from ..numerics.interpolation import cubic
@@ -171,6 +172,7 @@ class _Body:
 
     def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[_Step]) -> None:
         self.poses = _poses(skin)
+        self._jumps = set(skin.jumps)
         own = [step for step in steps if step.footprint.character == name]
         self._parts = []
         for sole, triangles in skin.triangles.items():
@@ -179,8 +181,9 @@ class _Body:
                 self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
 
     def parts(self, number: int) -> Iterator[tuple[_Step, _Step | None, Indices]]:
-        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles."""
-        for sole, taken, nearest, triangles in self._parts:
+        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles; none where
+        the body jumps."""
+        for sole, taken, nearest, triangles in self._parts if number not in self._jumps else ():
             before = nearest[number - 1]
             has_left = sole != NO_SOLE and before != nearest[number]
             yield taken[nearest[number]], taken[before] if has_left else None, triangles
@@ -209,7 +212,8 @@ def _poses(skin: RespondedSkin) -> Iterator[Array]:
         end = min(first + FRAMES_AT_ONCE, last)
         places = skin.at(np.arange(first - 1, end + 2).clip(0, last))
         for number in range(end - first):
-            yield places[number : number + 4]
+            before, after = (0 if place in skin.jumps else 1 for place in (first + number, first + number + 2))
+            yield places[[number + 1 - before, number + 1, number + 2, number + 2 + after]]
 
 
 class _Carving:
@@ -221,6 +225,7 @@ class _Carving:
         self._highest = 0.0
         """Highest surface over the undisturbed ground so far [m]."""
         self._layer_depth = ground.material.layer_depth
+        self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._pressed = SparseGrid(cell_size, channels=1)
         self._lowest = SparseGrid(cell_size, channels=1, fill=np.inf)
         self._loose = SparseGrid(cell_size, channels=1)
@@ -255,6 +260,8 @@ class _Carving:
         used, triangles = np.unique(triangles, return_inverse=True)
         triangles, around = triangles.reshape(-1, 3), around[:, used]
         both = around[1:3]
+        if not np.isfinite(around).all():
+            return
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
@@ -269,16 +276,16 @@ class _Carving:
         way = both[1, low] - both[0, low]
         distance = np.linalg.norm(way, axis=1)
         ahead, poses = way[distance.argmax(), :2], ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
+        floor = cells.terrain - self._layer_depth * (self._variation.factors(window).depth if self._variation else 1.0)
         cuts = min(poses, CUTS)
         underside = np.empty(0)
         for part in np.array_split(np.arange(1, poses + 1) / poses, cuts):
             underside = self._underside(cubic(around, 1.0 + part), triangles, window)
-            underside = np.maximum(underside, cells.terrain - self._layer_depth)
+            underside = np.maximum(underside, floor)
             cells.cut(underside, ahead, self._walls.packing)
         if round(frame) % SLIDES_EVERY == 0:
             body = underside < cells.surface + self._cell_size
             cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
-        self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
         self._keep(step, window, cells, frame, LEAST)
 
     def _underside(self, poses: Array, triangles: Indices, window: Window) -> Array:
@@ -337,6 +344,7 @@ class _Carving:
         step.cut += cells.cut_height
         step.packed += cells.packed
         step.unplaced += cells.unplaced
+        self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
         self._lowest.write(window, cells.lowest[None])
         self._loose.write(window, cells.loose[None])
         carved = np.stack([np.maximum(cells.pressed - cells.lowest, 0.0), cells.loose])

@@ -81,13 +81,15 @@ class RespondedSkin:
     ----------
     frames : (F,) float array
         Scene frames.
+    jumps : tuple of int
+        Samples at which the body is elsewhere than before, as at a cut.
     triangles : mapping of int to (T, 3) int array
         By the number of the sole that they go with, or `NO_SOLE`; without what is carried.
     """
 
     def __init__(self, worn: WornSkin, motion: CharacterMotion, response: Response) -> None:
         self._worn = worn
-        self.frames = motion.frames
+        self.frames, self.jumps = motion.frames, tuple(motion.starts[1:].tolist())
         recorded = vars(worn.recording)
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
         body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)
