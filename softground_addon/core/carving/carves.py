@@ -181,8 +181,10 @@ class _Body:
                 self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
 
     def parts(self, number: int) -> Iterator[tuple[_Step, _Step | None, Indices]]:
-        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles; none where
-        the body jumps."""
+        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles.
+
+        None where the body jumps.
+        """
         for sole, taken, nearest, triangles in self._parts if number not in self._jumps else ():
             before = nearest[number - 1]
             has_left = sole != NO_SOLE and before != nearest[number]

@@ -87,8 +87,11 @@ def test_the_skin_that_is_shown_passes_through_no_snow_and_all_that_it_cut_is_th
     lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
     assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
     assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
-    stored = bytes(baked_ground.stored_record(scene.softground.ground))
-    assert record.dump(record.load(stored)) == stored
+    again = record.load(record.dump(left)).carves
+    assert again.keys() == left.carves.keys()
+    for number, carve in left.carves.items():
+        assert np.array_equal(again[number].tile(again[number].rim, 20.5), carve.tile(carve.rim, 20.5))
+        assert np.array_equal(again[number].tile(again[number].compression), carve.tile(carve.compression))
 
 
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
