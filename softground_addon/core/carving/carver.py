@@ -65,7 +65,7 @@ class Walls:
         >>> from softground_addon.core.ground.surfaces import SURFACES
         >>> material = GroundMaterial(youngs_modulus=1e5, poisson_ratio=0.1, characteristic_time=0.2)
         >>> [round(Walls.of(SURFACES[name], material, 9.81).strength, 2) for name in ("snow", "sand", "mud")]
-        [0.92, 0.0, 0.62]
+        [0.92, 0.0, 0.63]
         """
         repose = material.repose_angle or np.radians(surface.thrown.repose)
         cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
