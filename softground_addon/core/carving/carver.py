@@ -30,11 +30,11 @@ TOLERANCE = 1e-3
 UNDER_SOLE = 0.01
 """The same of a sole that presses: within it the print is what the solver says, and the skin about that [m]; where the
 soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
-THINNEST = 0.1
+THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
-REACH = 0.07
+REACH = 0.05
 """How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
 
 
@@ -165,6 +165,18 @@ class CarvedCells:
         """Pack the loose matter under soles that press."""
         self.packed += float(self.loose[self.contact].sum())
         self.loose[self.contact] = 0.0
+
+    def gather(self, shown: Array, least: float) -> None:
+        """Undo changes of loose matter against what is `shown` (rows, columns) that are less than some height [m].
+
+        What they come to is spread over the cells that changed by more.
+        """
+        difference = self.loose - shown
+        thin = np.abs(difference) < least
+        others = ~thin & (self.loose > least)
+        share = difference[thin].sum() / max(np.count_nonzero(others), 1)
+        if others.any() and abs(share) < least:
+            self.loose = np.where(thin, shown, self.loose + share * others)
 
     def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
         """Let slide what is too steep; a body that stands in the ground holds it.

@@ -306,6 +306,7 @@ class _Carving:
         window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
         cells = self._cells(window)
         cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), sweeps)
+        cells.gather(self._recorded.read(window)[1] * QUANTUM, LEAST * QUANTUM)
         self._keep(step, window, cells, frame, 1)
 
     def footprint(self, step: _Step) -> Footprint:
