@@ -159,6 +159,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         **vars(units_of(scene)),
         response=_response(options, grounded=grounded),
         sink_feet=options.sink_feet,
+        carve=options.carve,
         output=options.output,
         detail=options.detail,
         shape_keys=options.shape_keys,

@@ -156,6 +156,8 @@ class BakeSettings(SceneUnits):
         Objects that soles stand on without a print.
     marks : bool
         Whether soles leave on hard ground what sticks to them.
+    carve : bool
+        Whether bodies carve deep ground where their feet are let down.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -191,11 +193,18 @@ class BakeSettings(SceneUnits):
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
+    carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
 
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
         return spacing_of(self.cell_size_m, self.relief)
+
+    @property
+    def carves(self) -> bool:
+        """True if bodies may carve the ground: their feet are let down into it, and both are shown."""
+        sinks = self.response is not None and self.response.grounding is not None
+        return self.carve and self.output == "BOTH" and sinks
 
     @property
     def fineness(self) -> Fineness:

@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings, offsets_mm, press_shot
@@ -112,7 +113,10 @@ def bake(
     frames = wanted.frames[1] - wanted.frames[0] + 1
     pressing = press_shot(wanted, shot.motions, ground, edits, factors)
     pressed = yield from counted(pressing, "simulate", frames)
-    throwing = with_debris.slices(pressed.left, ground, wanted, pressed.loads)
+    responses = [(each.motion, each.response) for each in pressed.responses]
+    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
+    left = yield from meanwhile(Progress("simulate", 1.0), carving)
+    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
     left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
     marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
     marks = yield from meanwhile(Progress("simulate", 1.0), marking)
@@ -144,6 +148,7 @@ def bake(
         inputs=inputs,
         input_hash=input_hash,
         steps=left.steps,
+        carves=left.carves,
         edits=left.edits,
         offsets_mm=offsets_mm(pressed.loads),
         forces=pressed.forces,
@@ -157,7 +162,7 @@ def bake(
     layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del pressed, pressing, throwing, marking, measuring, checking
+    del pressed, pressing, responses, carving, throwing, marking, measuring, checking
     published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
@@ -219,7 +224,7 @@ def write_prints(
     weather_before = weather.values_of(settings.found(wanted.ground)) if wanted.ground else {}
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        pressing = PressedGround.at.slices(left.edited, **at_the_end(wanted))
+        pressing = PressedGround.at.slices(left.shaping, **at_the_end(wanted))
         pressed = yield from meanwhile(Progress("write", 0.1), pressing)
         yield Progress("write", 0.1)
         trail = pressed.trail(trail_detail.FLOOR)

@@ -113,7 +113,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         Where it goes.
     made_with : BakeSettings
     """
-    footprints = left.edited
+    footprints = left.shaping
     stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)

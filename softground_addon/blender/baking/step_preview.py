@@ -58,7 +58,7 @@ class StepPreview:
         self._changed = windows
         positions = self._before.copy()
         made_with = self._bake.made_with
-        sample = sample_at(left.edited, self._x[near], self._y[near], **at_the_end(made_with))
+        sample = sample_at(left.shaping, self._x[near], self._y[near], **at_the_end(made_with))
         positions[near] = self._rest[near] + (sample.display[:, None] * self._up).astype(np.float32)
         self._write(positions)
         if self._pieces:  # of those that move, and on ground that moves: they are thrown anew once the step is let go

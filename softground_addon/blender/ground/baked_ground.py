@@ -252,7 +252,7 @@ def record_of(ground: bpy.types.Object) -> record.BakeRecord:
 
 
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
-    """The record of a ground's bake: its footprints as the artist left them, and what is known about them.
+    """The record of a ground's bake: its footprints as the artist left them, its carves, and what is known about them.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
     left = record_of(ground)
-    return left.edited, dict(left.about)
+    return left.shaping, dict(left.about)
 
 
 def events_of(ground: bpy.types.Object) -> list[Event]:

@@ -43,7 +43,7 @@ def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tup
     dict of (character, sole) to two (N,) float arrays
     """
     curves: dict[tuple[str, str], tuple[Array, Array]] = {}
-    for footprint in footprints:
+    for footprint in (each for each in footprints if len(each.load_n)):
         key = (footprint.character, footprint.sole)
         force, contact = curves.setdefault(key, (np.zeros(len(frames)), np.zeros(len(frames))))
         touching = (frames >= footprint.start_frame) & (frames <= footprint.end_frame)

@@ -51,6 +51,9 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "tread_pattern")
         if options.tread_pattern == IMAGE:
             column.template_ID(options, "tread_image", open="image.open")
+        row = column.row()
+        row.active = settings.sinks_feet(options)
+        row.prop(options, "carve")
         column.prop(options, "debris")
         if options.debris and options.ground is not None:
             _wind(column, options.ground)

@@ -307,6 +307,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "without it",
         default=True,
     )
+    carve: BoolProperty(
+        name="Carve",
+        description="Let legs and whatever else is in the ground carve it, where feet that are sunk go deeper than the "
+        "ankle",
+        default=True,
+    )
     has_layers: BoolProperty(
         name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}
     )

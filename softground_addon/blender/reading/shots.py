@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carving.responded_skin import WornSkin
 from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
 from ...core.composers.relief_plan import IMAGE
 from ...core.composers.shot_loads import loads_of_shot
@@ -74,6 +75,11 @@ class Shot:
     terrain: Terrain
     rigs: tuple[ReadRig, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def skins(self) -> dict[str, WornSkin]:
+        """The skins of the characters that may carve, by their names."""
+        return {rig.poses.skin.character: rig.poses.skin for rig in self.rigs if rig.poses.skin}
 
     @property
     def variation(self) -> PaintedSurface | None:
@@ -202,7 +208,7 @@ def sample_characters(
             if wanted.response:
                 check_rig(scene, armature, mapping, character.mass_kg)
                 controls = controls_of(scene, armature, mapping)
-                poses = RigPoses([control.bone for control in controls])
+                poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
             grown = size_of(scene, armature) / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,

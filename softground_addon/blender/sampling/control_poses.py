@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carving.responded_skin import WornSkin
 from ...core.rig.recording import Recording
 
 Array = NDArray[np.float64]
@@ -22,12 +23,15 @@ class RigPoses:
         Pose of each bone in the armature's frame [Blender units].
     world : (F, 4, 4) float array
         Of the armature [Blender units].
+    skin : WornSkin or None
+        What moves with all of its bones, if that is wanted and was read.
     """
 
     world: Array
 
-    def __init__(self, bones: Sequence[str]) -> None:
-        self.bones = tuple(bones)
+    def __init__(self, bones: Sequence[str], *, with_skin: bool = False) -> None:
+        self.bones, self.with_skin = tuple(bones), with_skin
+        self.skin: WornSkin | None = None
         self.matrices: dict[str, Array] = {}
 
     def take(self, recording: Recording) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
+from ...core.carving.responded_skin import WornSkin
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping, bones_of
@@ -100,6 +101,8 @@ def sample_character(
     recording = yield from record(scene, armature, frames, bones, units, props, shapes, below=below, findings=findings)
     if poses:
         poses.take(recording)
+        if poses.with_skin and skin and {*skin.bones} <= {*recording.bones}:
+            poses.skin = WornSkin(rig.name, skin, rest_bones(found(rig)), mapping, recording)
     return (yield from recorded_motion(scene, found(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
 
 

@@ -68,7 +68,7 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     """
     name = settings.name_of(ground)
     _check_names(baked_ground.display_mesh_of(ground))
-    footprints, about = (left.edited, left.about) if left else baked_ground.load(ground)
+    footprints, about = (left.shaping, left.about) if left else baked_ground.load(ground)
     places = yield from _places(ground, footprints, about)
     ground = settings.found(name)
     display_mesh = baked_ground.display_mesh_of(ground)

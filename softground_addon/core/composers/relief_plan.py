@@ -55,7 +55,7 @@ def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[t
     """
     shod = set()
     for character in inputs["characters"]:
-        steps = [step for step in footprints if step.character == character["name"]]
+        steps = [step for step in footprints if step.character == character["name"] and len(step.contact_cells)]
         limbs = {sole["name"] for sole in character["soles"] if sole["bone"] and sole["limb"]}
         feet = _two_feet(character)
         if _is_upright([step for step in steps if step.sole in feet], [step for step in steps if step.sole in limbs]):

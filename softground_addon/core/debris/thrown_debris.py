@@ -70,7 +70,7 @@ def _thrown(
     left = replace(left, thrown={})
     thrown_by = yield from sources.slices(left.throws, left.steps, surface=surface, gravity=gravity)
     left = replace(left, thrown=volumes(thrown_by))
-    pressed = recompose(left.edited, cell_size=cell_size)
+    pressed = recompose(left.shaping, cell_size=cell_size)
     yield
     bare = flight.SampledHeights(ground.terrain.heights, cell_size)  # thousands fall side by side
 

@@ -14,6 +14,7 @@ import numpy as np
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
+from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from ..record.typical_depth import typical_of
 
@@ -36,6 +37,7 @@ def build(
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
     carried_kg: Mapping[str, float] | None = None,
+    carves: Mapping[int, Footprint] | None = None,
 ) -> dict[str, Any]:
     """The whole report of a bake, ready for JSON.
 
@@ -69,6 +71,8 @@ def build(
         From `core.events.events`.
     carried_kg : mapping, optional
         Masses that soles carried onto hard floors, of a `core.carried.film.CarriedMass`.
+    carves : mapping of int to Footprint, optional
+        Of the `BakeRecord`.
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
@@ -95,6 +99,10 @@ def build(
     }
     if carried_kg is not None:
         report["totals"]["carried_kg"] = dict(carried_kg)
+    if carves:
+        lying = [carves[step.index] for step in steps if step.left and step.index in carves]
+        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in lying)
+        report["carved"] = _carved(lying)
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:
@@ -105,6 +113,18 @@ def build(
     if forces is not None:
         report["forces"] = dict(forces)
     return report
+
+
+def _carved(carves: Sequence[Footprint]) -> dict[str, dict[str, float]]:
+    """Volumes that each character cut, packed into walls, left loose, and found no place for [m³]."""
+    volumes: dict[str, dict[str, float]] = {}
+    for carve in carves:
+        packed = carve.compressed_m3 - carve.rim_m3 - carve.unplaced_rim_m3
+        of_step = (carve.compressed_m3, packed, carve.rim_m3, carve.unplaced_rim_m3)
+        sums = volumes.setdefault(carve.character, {})
+        for name, volume in zip(("cut_m3", "packed_m3", "loose_m3", "unplaced_m3"), of_step, strict=True):
+            sums[name] = sums.get(name, 0.0) + volume
+    return volumes
 
 
 def _step(editable: EditableStep) -> dict[str, Any]:

@@ -178,6 +178,12 @@ class SurfaceRecord:
         Names of its function in `blender.materials.surface_shaders` and of its table of amounts in presets/relief.
     midi_note : int
         Of the left foot; the right one's is the next, and the next that of all else.
+    wall_packing : float
+        Part of the volume that a leg carves out of deep ground that is packed into the wall: of snow 1 - rho/rho_max
+        with 550 kg/m³ of snow packed by hand, of others by eye.
+    wall_cohesion : float
+        Cohesion by which such a wall stands [Pa]: of snow for walls of 0.9 m; of wet
+        sand by capillarity; dry sand has none (by eye, and by the yield stress of mud).
     soaking : Soaking or None
         How it takes up rain: sand, loam and clay, dry; wet sand has had its first rain. None of snow, which takes up
         what falls.
@@ -203,6 +209,8 @@ class SurfaceRecord:
     shader: str
     relief: str
     midi_note: int
+    wall_packing: float = 0.0
+    wall_cohesion: float = 0.0
     soaking: Soaking | None = None
     drifts_from: float | None = None
     melts: bool = False
@@ -230,6 +238,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(1.0, 0.25, 0.3, 0.0, (1000, 4000), (0.0015, 0.004), 220.0, 1.5, (1500, 6000), (80, 150)),
         colour=(0.87, 0.90, 0.94), shades=(0.92, 1.0), swell=0.50,
         shader="snow", relief="snow", midi_note=36,
+        wall_packing=0.73, wall_cohesion=180.0,
         drifts_from=0.27, melts=True, control="hand_hardness",
         carried=CarriedFilm("snow", most=0.3, taken=0.2, left=0.5, water=1.0),
     ),
@@ -241,6 +250,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.0, 1.0, 0.25, 0.0, (2000, 6000), (0.0005, 0.001), 0.0, 1.5, (1200, 7000), (60, 110)),
         colour=(0.66, 0.48, 0.29), shades=(0.84, 1.10), swell=0.20,
         shader="dry_sand", relief="sand", midi_note=40,
+        wall_packing=0.05, wall_cohesion=0.0,
         soaking=Soaking(127e-3 / HOUR, 10e-3 / HOUR, 4.0 / HOUR, 2.0), drifts_from=0.23, control="moisture",
     ),
     SurfaceRecord(
@@ -251,6 +261,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.25, 0.7, 0.5, 0.15, (800, 3000), (0.001, 0.003), 200.0, 1.6, (600, 3500), (70, 120)),
         colour=(0.24, 0.16, 0.09), shades=(0.74, 1.18), swell=0.14,
         shader="wet_sand", relief="wet_sand", midi_note=44,
+        wall_packing=0.05, wall_cohesion=1000.0,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
         carried=CarriedFilm("sand", most=0.8, taken=0.5, left=0.35, water=0.2),
     ),
@@ -265,6 +276,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.3, 0.6, 0.5, 0.8, (250, 900), (0.004, 0.012), 60.0, 1.8, (150, 1200), (60, 100)),
         colour=(0.10, 0.065, 0.04), shades=(0.70, 1.25), swell=0.16,
         shader="mud", relief="mud", midi_note=48,
+        wall_packing=0.0, wall_cohesion=2000.0,
         soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",
         carried=CarriedFilm("mud", most=3.5, taken=2.5, left=0.2, water=0.35),
     ),
@@ -276,6 +288,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.9, 0.35, 0.45, 0.0, (500, 3000), (0.002, 0.007), 500.0, 1.3, (400, 2500), (70, 140)),
         colour=(0.12, 0.07, 0.04), shades=(0.70, 1.25), swell=0.16,
         shader="soil", relief="soil", midi_note=52,
+        wall_packing=0.15, wall_cohesion=1000.0,
         soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0), control="soil_moisture",
     ),
 )}  # fmt: skip

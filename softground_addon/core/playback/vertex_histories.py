@@ -29,6 +29,10 @@ SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
 
 
+CARVED_TOLERANCE = 5e-3
+"""Largest error of ground that bodies carve, while it moves [m]: loose matter that slides to and fro has no edge."""
+
+
 @dataclass(frozen=True)
 class PointContacts:
     """Contacts of soles with places, and their pressure.
@@ -120,14 +124,19 @@ def vertex_histories(
     movements: list[Ramps] = []
     contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
+    is_carved = np.array([not len(footprint.contact_cells) for footprint in footprints], dtype=bool)
     for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
         of_step: list[Ramps] = []
-        together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
+        alike = is_carved == is_carved[number]
+        together = np.flatnonzero(alike & (spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
+        allowed = np.array([tolerance, SHADING_TOLERANCE])
+        if is_carved[number]:
+            allowed = np.maximum(allowed, CARVED_TOLERANCE)
         for points, frames, moved in _movements(in_blocks[near[number]], places, kernels[footprint.cell_size]):
             shared = np.zeros(len(points))
             for other in together:
                 shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
-            fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
+            fitted = fit(frames, moved, allowed / shared[:, None])
             of_step.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
             yield

@@ -52,6 +52,7 @@ def slid(
     angle: float,
     cell_size: float,
     fixed: Mask,
+    walls: tuple[Array, float] | None = None,
     corner: tuple[int, int] = (0, 0),
     sweeps: int = SWEEPS_TO_REST,
 ) -> Array:
@@ -71,6 +72,8 @@ def slid(
         Side of a cell [m].
     fixed : (rows, columns) bool array
         Cells that nothing leaves or enters: under a sole, off the ground.
+    walls : ((rows, columns) float array, float), optional
+        Heights of what stands below loose matter, and the height up to which its walls hold, however steep [m].
     corner : tuple of int
         Row and column of the first cell in the plane, so that the same cells pair up whatever the window.
     sweeps : int
@@ -85,6 +88,8 @@ def slid(
     rests = np.full((len(NEIGHBOURS), *rim.shape), np.inf)
     for rest, (near, other, way) in zip(rests, NEIGHBOURS, strict=True):
         rest[near] = np.maximum(np.abs(ground[near] - ground[other]), steepest * hypot(*way))
+        if walls is not None:
+            rest[near] = np.maximum(rest[near], np.minimum(np.abs(walls[0][near] - walls[0][other]), walls[1]))
         rest[near][fixed[near] | fixed[other]] = np.inf
     before = ground - compression + rim
     height, box = before.copy(), (slice(0, len(rim)), slice(0, rim.shape[1]))

@@ -6,7 +6,7 @@ may be put together in any order, overlapping or not, and give the simulation's 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -184,6 +184,11 @@ class FootprintRecorder:
         self._windows: list[Window] = []
         self._changes: tuple[list[Any], list[Any]] = ([], [])
         self._contacts: list[NDArray[np.intp]] = []
+
+    @property
+    def frames(self) -> Sequence[float]:
+        """Scene frames of all changes so far."""
+        return self._frames
 
     @property
     def window(self) -> Window:

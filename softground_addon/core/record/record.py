@@ -73,6 +73,8 @@ class BakeRecord:
     thrown : mapping of int to mapping of str to float
         Volumes that the edited steps have thrown, by their numbers and by phase [m³]: they are missing from the rims of
         `edited` and `steps`, not from those of `footprints` and `pressed_again`.
+    carves : mapping of int to Footprint
+        What bodies carved beside their prints in deep ground, by the numbers of the steps that it goes with.
     """
 
     footprints: Sequence[Footprint]
@@ -81,10 +83,17 @@ class BakeRecord:
     pressed_again: Mapping[int, Footprint | None] = field(default_factory=dict)
     throws: Sequence[step_throws.Throw] = ()
     thrown: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
+    carves: Mapping[int, Footprint] = field(default_factory=dict)
+
+    @property
+    def shaping(self) -> list[Footprint]:
+        """All that the ground is made from: the edited footprints, and after them the carves of steps that are left."""
+        carved = [step.index for step in self.steps if step.left and step.index in self.carves]
+        return [*self.edited, *(self.carves[number] for number in carved)]
 
     @property
     def edited(self) -> list[Footprint]:
-        """The footprints after the artist's edits, in their order: those that the ground is made from."""
+        """The footprints after the artist's edits, in their order."""
         prints = [step.left for step in self.steps if step.left is not None]
         return sorted(prints, key=lambda footprint: footprint.start_frame) if self.edits else prints
 
@@ -152,7 +161,8 @@ def dump(record: BakeRecord) -> Slices[bytes]:
     """The record as bytes: equal records give equal bytes."""
     again = sorted(record.pressed_again.items())
     prints = [footprint for _, footprint in again if footprint is not None]
-    names, soles, arrays = to_parts([*record.footprints, *prints])
+    carves = sorted(record.carves.items())
+    names, soles, arrays = to_parts([*record.footprints, *prints, *(carve for _, carve in carves)])
     content = {
         "format": FORMAT,
         "footprints": names,
@@ -162,6 +172,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         "pressed_again": [[number, footprint is not None] for number, footprint in again],
         "throws": [step_throws.to_json(throw) for throw in record.throws],
         "thrown": [[number, dict(volumes)] for number, volumes in sorted(record.thrown.items())],
+        **({"carves": [number for number, _ in carves]} if carves else {}),
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -209,7 +220,10 @@ def load(content: bytes) -> BakeRecord:
             text, arrays = MIGRATIONS[older](text, arrays)
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
         soles, again = text["soles"], [(number, has_print) for number, has_print in text["pressed_again"]]
-        baked = _count_baked(len(names), again)
+        carved = list(text.get("carves", []))
+        baked = _count_baked(len(names) - len(carved), again)
+        if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in carved):
+            raise ValueError("carves of steps that it does not have")
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
@@ -220,7 +234,8 @@ def load(content: bytes) -> BakeRecord:
     footprints = from_arrays(names, soles, arrays)
     prints = iter(footprints[baked:])
     pressed_again = {number: next(prints) if has_print else None for number, has_print in again}
-    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown)
+    carves = dict(zip(carved, prints, strict=True))
+    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves)
 
 
 def _thrown(rows: list[Any], baked: int) -> dict[int, dict[str, float]]:

@@ -108,6 +108,8 @@ def _step(
     blur_sigma: float,
 ) -> StepRelief:
     """Relief that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
+    if not len(footprint.contact_cells):
+        return NOTHING
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
     point = places.within(footprint.window.expanded(margin), footprint.cell_size) if len(places.x) else NOTHING.point
     if not len(point):

@@ -1,0 +1,236 @@
+"""Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
+
+Over the pressed ground T, every cell keeps the lowest underside K that passed it and the loose matter l on it: what
+stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. Of what stood, a part is packed into
+the wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
+are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
+
+References
+----------
+Terzaghi 1943, "Theoretical Soil Mechanics", doi:10.1002/9780470172766: the height of a vertical cut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, pi, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.material import GroundMaterial
+from ..ground.surfaces import SurfaceRecord
+from ..pressing.repose import slid
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOLERANCE = 1e-3
+"""Skin that is less deep in the ground does not cut it [m]."""
+UNDER_SOLE = 0.01
+"""The same of a sole that presses: within it the print is what the solver says, and the skin about that [m]; where the
+soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+THINNEST = 0.2
+"""Loose matter is laid where it is at least so thick, over its thickest."""
+ROUNDING = 1e-12
+"""Heights below zero by no more than this are zero [m]."""
+REACH = 0.05
+"""How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
+
+
+@dataclass(frozen=True)
+class Walls:
+    """How ground stands that was cut.
+
+    Attributes
+    ----------
+    packing : float
+        Part of the cut volume that is packed into the wall.
+    strength : float
+        Height up to which a wall stands [m]: Hc = 4·c/(rho·g)·tan(45° + phi/2) (Terzaghi 1943, a vertical cut).
+    repose : float
+        Angle of repose of loose matter [rad].
+    """
+
+    packing: float
+    strength: float
+    repose: float
+
+    @classmethod
+    def of(cls, surface: SurfaceRecord, material: GroundMaterial, gravity: float) -> Walls:
+        """The walls of a ground, under a gravity [m/s²].
+
+        Examples
+        --------
+        >>> from softground_addon.core.ground.surfaces import SURFACES
+        >>> material = GroundMaterial(youngs_modulus=1e5, poisson_ratio=0.1, characteristic_time=0.2)
+        >>> [round(Walls.of(SURFACES[name], material, 9.81).strength, 2) for name in ("snow", "sand", "mud")]
+        [0.92, 0.0, 0.63]
+        """
+        repose = material.repose_angle or np.radians(surface.thrown.repose)
+        cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
+        return cls(surface.wall_packing, cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0, repose)
+
+    def reach(self, surface: Array, loose: Array, cell_size: float) -> int:
+        """Number of cells around a window that what slides may spread over, from its heights (rows, columns) [m]."""
+        drop = min(np.ptp(surface), loose.max() + max(np.ptp(surface) - self.strength, 0.0))
+        return ceil(drop / (tan(self.repose) * cell_size)) + 1
+
+
+@dataclass
+class CarvedCells:
+    """A window of ground that a body is in; `press`, `cut`, `pack` and `slide` change it and count what they do.
+
+    Attributes
+    ----------
+    cell_size : float
+        Side of a cell [m].
+    terrain : (rows, columns) float array
+        Height of the undisturbed ground [m].
+    closed : (rows, columns) bool array
+        Cells that nothing is cut from or laid on: off the ground.
+    contact : (rows, columns) bool array
+        Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
+    pressed : (rows, columns) float array
+        Height of the pressed ground T, with its rims [m].
+    lowest : (rows, columns) float array
+        Lowest underside K so far [m], infinite where none passed.
+    loose : (rows, columns) float array
+        Height of the loose matter [m].
+    cut_height, packed, unplaced : float
+        Sums of the heights that were cut of what stood, packed, and found no place around [m].
+    """
+
+    cell_size: float
+    terrain: Array
+    closed: Mask
+    contact: Mask
+    pressed: Array
+    lowest: Array
+    loose: Array
+    cut_height: float = 0.0
+    packed: float = 0.0
+    unplaced: float = 0.0
+
+    @property
+    def standing(self) -> Array:
+        """Height of what stands, (rows, columns) [m]."""
+        return np.minimum(self.pressed, self.lowest)
+
+    @property
+    def surface(self) -> Array:
+        """Height of the ground, (rows, columns) [m]."""
+        return self.standing + self.loose
+
+    def press(self, pressed: Array) -> None:
+        """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
+        before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
+        self.loose += np.maximum(after - before, 0.0)
+        self.pressed = pressed
+
+    def cut(self, underside: Array, way: Array, packing: float) -> None:
+        """Cut the ground to a body's underside.
+
+        Parameters
+        ----------
+        underside : (rows, columns) float array
+            Lowest surface of the body over each cell [m], infinite where there is none.
+        way : (2,) float array
+            Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
+        packing : float
+            See `Walls`.
+        """
+        standing = self.standing
+        depth = standing + self.loose - underside
+        depth[self.closed | (depth < np.where(self.contact, UNDER_SOLE, TOLERANCE))] = 0.0
+        if not depth.any():
+            return
+        of_loose = np.minimum(self.loose, depth)
+        of_standing = depth - of_loose
+        self.loose -= of_loose
+        self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
+        self.cut_height += float(of_standing.sum())
+        self.packed += packing * float(of_standing.sum())
+        thrown = of_loose + (1.0 - packing) * of_standing
+        if not thrown.any():
+            return
+        free = ~(self.closed | self.contact) & (underside > self.surface + TOLERANCE)
+        spread = np.where(free, _around(thrown, way, self.cell_size), 0.0)
+        if (there := spread.sum()) > 0:
+            self.loose += spread * (thrown.sum() / there)
+        else:
+            self.unplaced += float(thrown.sum())
+
+    def pack(self) -> None:
+        """Pack the loose matter under soles that press."""
+        self.packed += float(self.loose[self.contact].sum())
+        self.loose[self.contact] = 0.0
+
+    def gather(self, shown: Array, least: float) -> None:
+        """Undo changes of loose matter against what is `shown` (rows, columns) that are less than some height [m].
+
+        What they come to is spread over the cells that changed by more.
+        """
+        difference = self.loose - shown
+        thin = np.abs(difference) < least
+        others = ~thin & (self.loose > least)
+        share = difference[thin].sum() / max(np.count_nonzero(others), 1)
+        if others.any() and abs(share) < least:
+            self.loose = np.where(thin, shown, self.loose + share * others)
+
+    def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
+        """Let slide what is too steep; a body that stands in the ground holds it.
+
+        Parameters
+        ----------
+        walls : Walls
+        body : (rows, columns) bool array
+            Cells with a body in the ground.
+        corner : tuple of int
+            Row and column of the first cell in the plane.
+        sweeps : int
+            Most sweeps (see `repose.slid`).
+        """
+        standing = self.standing
+        before = standing + self.loose
+        change = slid(
+            before - self.terrain,
+            np.zeros_like(before),
+            self.terrain,
+            angle=walls.repose,
+            cell_size=self.cell_size,
+            fixed=self.closed | self.contact | body,
+            walls=(standing, walls.strength),
+            corner=corner,
+            sweeps=sweeps,
+        ) - (before - self.terrain)
+        loose = self.loose + change
+        fallen = loose < -ROUNDING
+        self.lowest[fallen] = (standing + loose)[fallen]
+        self.loose = np.maximum(loose, 0.0)
+
+
+def _around(thrown: Array, way: Array, cell_size: float) -> Array:
+    """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
+    reach, length = max(round(REACH / cell_size), 1), float(np.hypot(*way))
+    ahead = np.rint(way[::-1] / length * reach).astype(int) if length > 0 else np.zeros(2, int)
+    rows, columns = (np.flatnonzero(thrown.any(axis=axis)) for axis in (1, 0))
+    first, last = np.array((rows[0], columns[0])), np.array((rows[-1], columns[-1])) + 1
+    spread = np.pad(thrown[first[0] : last[0], first[1] : last[1]], 2 * reach)
+    for axis in (0, 1, 0, 1):
+        spread = _box_mean(spread, reach | 1, axis)
+    beyond = 4 * reach
+    laid = np.zeros((thrown.shape[0] + 2 * beyond, thrown.shape[1] + 2 * beyond))
+    for shift in (np.zeros(2, int), ahead):
+        row, column = first + shift + beyond - 2 * reach
+        laid[row : row + len(spread), column : column + spread.shape[1]] += spread
+    return np.where(laid > THINNEST * laid.max(), laid, 0.0)[beyond:-beyond, beyond:-beyond]
+
+
+def _box_mean(values: Array, width: int, axis: int) -> Array:
+    """Means of values (rows, columns) over an odd number of cells along an axis; beyond their edge there is nothing."""
+    around = [(0, 0), (0, 0)]
+    around[axis] = (width // 2 + 1, width // 2)
+    sums = np.cumsum(np.pad(values, around), axis=axis)
+    after, before = (np.take(sums, np.arange(first, first + values.shape[axis]), axis=axis) for first in (width, 0))
+    return np.asarray((after - before) / width)

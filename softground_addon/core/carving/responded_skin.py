@@ -1,0 +1,135 @@
+"""The skin of a character as the response moves it, in the parts that go with each of its soles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..legs.grounding import Response, leg_soles
+from ..motion.motion import CharacterMotion
+from ..rig.bones import RigBones, above, family
+from ..rig.mapping import RigMapping
+from ..rig.recording import Recording
+from ..rig.rig_skin import RigSkin, carried, skinned
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+NO_SOLE = -1
+"""In place of the sole of skin that belongs to several, as a trunk does."""
+
+
+@dataclass(frozen=True)
+class WornSkin:
+    """The skin of a rig as it was recorded.
+
+    Attributes
+    ----------
+    character : str
+        Its name.
+    skin : RigSkin
+    bones : RigBones
+    mapping : RigMapping
+    recording : Recording
+        Of all `skin.bones`.
+    """
+
+    character: str
+    skin: RigSkin
+    bones: RigBones
+    mapping: RigMapping
+    recording: Recording
+
+
+@dataclass(frozen=True)
+class _Responding(Recording):
+    """A recording whose bones are displaced in the world: `parts` (F, 4, 4) by name, all others as the `body`."""
+
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    body: Array = field(default_factory=lambda: np.eye(4)[None])
+
+    @property
+    def armature(self) -> Array:
+        """World matrices of the armature, (F, 4, 4) [m]."""
+        return np.asarray(self.body @ super().armature)
+
+    def bone(self, name: str) -> Array:
+        """World matrices of a bone, (F, 4, 4) [m]."""
+        return np.asarray(self.parts.get(name, self.body) @ super().bone(name))
+
+    def of(self, samples: NDArray[np.intp]) -> _Responding:
+        """Some of the samples."""
+        parts = {name: part[samples] for name, part in self.parts.items()}
+        return replace(cast("_Responding", super().of(samples)), parts=parts, body=self.body[samples])
+
+
+class RespondedSkin:
+    """The skin of a character that responds.
+
+    Parameters
+    ----------
+    worn : WornSkin
+    motion : CharacterMotion
+        At the frames of its recording.
+    response : Response
+
+    Attributes
+    ----------
+    frames : (F,) float array
+        Scene frames.
+    jumps : tuple of int
+        Samples at which the body is elsewhere than before, as at a cut.
+    triangles : mapping of int to (T, 3) int array
+        By the number of the sole that they go with, or `NO_SOLE`; without what is carried.
+    """
+
+    def __init__(self, worn: WornSkin, motion: CharacterMotion, response: Response) -> None:
+        self._worn = worn
+        self.frames, self.jumps = motion.frames, tuple(motion.starts[1:].tolist())
+        recorded = vars(worn.recording)
+        self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
+        body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)
+        sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[worn.skin.triangles[:, 0]]]
+        self.triangles = {int(number): worn.skin.triangles[body & (sole == number)] for number in np.unique(sole[body])}
+
+    def at(self, samples: Indices) -> Array:
+        """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""
+        count = len(self._worn.skin.vertices)
+        recording = self._recording.of(samples)
+        return skinned(self._worn.skin, self._worn.bones, recording, np.arange(count)).astype(float)
+
+
+def _parts_of_bones(worn: WornSkin, motion: CharacterMotion, response: Response) -> dict[str, Array]:
+    """Displacement of the skin's bones that do not go with the body, (F, 4, 4) each."""
+    moved: dict[str, Array] = {}
+    joints, sources = worn.mapping.joints, {source.name: source for source in worn.mapping.soles}
+    soles = leg_soles(motion)
+    for side, leg in response.legs.items():
+        of_joints = (("hip", leg.thigh), ("knee", leg.shank), ("ankle", leg.foot), ("ball", leg.foot))
+        moved |= {joints[f"{joint}_{side}"][0]: part for joint, part in of_joints if f"{joint}_{side}" in joints}
+        source = sources[motion.soles[soles[side]].sole.name]
+        moved |= dict.fromkeys((bone for bone in (source.bone, source.toe_bone) if bone), leg.foot)
+    for side, arm in response.arms.items():
+        moved[joints[f"shoulder_{side}"][0]] = response.body @ arm
+    names = worn.skin.bones
+    nearest = {name: next((b for b in (name, *above(worn.bones, name)) if b in moved), "") for name in names}
+    return {name: moved[bone] for name, bone in nearest.items() if bone}
+
+
+def _soles_of_bones(worn: WornSkin) -> Indices:
+    """Number of the sole that each bone of the skin goes with, (B,)."""
+    owners: dict[str, set[int]] = {}
+    for number, source in enumerate(worn.mapping.soles):
+        for bone in (source.bone, source.toe_bone):
+            if bone:
+                for name in {*family(worn.bones, bone), *above(worn.bones, bone)}:
+                    owners.setdefault(name, set()).add(number)
+    found = []
+    for name in worn.skin.bones:
+        owned = next((owners[bone] for bone in (name, *above(worn.bones, name)) if bone in owners), set[int]())
+        found.append(next(iter(owned)) if len(owned) == 1 else NO_SOLE)
+    return np.array(found, dtype=np.intp)

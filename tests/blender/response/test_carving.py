@@ -1,0 +1,133 @@
+"""Legs carve deep ground: the skin that is shown passes through no snow, and what it cut is somewhere."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job, step_edits
+from softground_addon.blender.ground import baked_ground
+from softground_addon.core.carving import carves
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.record.footprints import recompose
+from tests.blender import shots
+
+FRAMES = 44
+CELL = 0.01
+DEEP = {"youngs_modulus": 123e3, "poisson_ratio": 0.0, "characteristic_time": 0.2, "layer_depth": 0.60}
+"""Snow in which the sample walk sinks 35 cm, without rims."""
+
+
+def walker(scene, **material):
+    armature = shots.walker(scene, frames=FRAMES)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.frame_end, options.sink_feet, options.pressure = FRAMES, True, "CENTRE_OF_PRESSURE"
+    for name, value in material.items():
+        setattr(options.material, name, value)
+    return armature
+
+
+def bake(scene):
+    report = jobs.run(bake_job.bake(scene)).report
+    return report, baked_ground.record_of(scene.softground.ground)
+
+
+@pytest.fixture
+def skins(monkeypatch):
+    """The responded skins of the bakes of a test, as they are carved with."""
+    seen, made = [], carves.RespondedSkin
+
+    def keep(*arguments):
+        seen.append(made(*arguments))
+        return seen[-1]
+
+    monkeypatch.setattr(carves, "RespondedSkin", keep)
+    return seen
+
+
+def shown_skin(armature):
+    """The vertices that Blender shows at the current frame (V, 3) [m]."""
+    depsgraph, places = bpy.context.evaluated_depsgraph_get(), []
+    for obj in (child for child in armature.children if child.type == "MESH"):
+        evaluated = obj.evaluated_get(depsgraph)
+        mesh, matrix = evaluated.to_mesh(), np.array(evaluated.matrix_world)
+        place = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", place)
+        places.append(place.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(places)
+
+
+def in_the_ground(footprints, places, frame):
+    """How far places (V, 3) lie below all ground within a cell of them, (V,) [m]."""
+    ground, (x, y, z) = recompose(footprints, frame), places.T
+    ways = [(right, up) for right in (-CELL, 0.0, CELL) for up in (-CELL, 0.0, CELL)]
+    around = [ground.nearest(x + right, y + up) for right, up in ways]
+    return np.min([rim - compression for compression, rim in around], axis=0) - z
+
+
+def test_the_skin_that_is_shown_passes_through_no_snow_and_all_that_it_cut_is_there(scene, skins):
+    armature = walker(scene, **DEEP)
+    report, left = bake(scene)
+    (skin,) = skins
+    before, after = [], []
+    for frame in range(4, FRAMES, 8):
+        scene.frame_set(frame)
+        places = skin.at(np.array([frame - 1]))[0]
+        assert places == pytest.approx(shown_skin(armature), abs=1e-3)
+        before.append(in_the_ground(left.edited, places, frame).max())
+        after.append(in_the_ground(left.shaping, places, frame).max())
+    print(f"\nskin in the ground: {np.round(before, 3)} m, carved {np.round(after, 3)} m; {report['carved']}")
+    assert np.median(before) > 0.1
+    assert max(after) < CELL + 0.002
+    volumes = report["carved"][armature.name]
+    assert 0.005 < volumes["cut_m3"] < 0.05
+    assert report["totals"]["carved_m3"] == volumes["cut_m3"]
+    lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
+    assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
+    assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
+    again = record.load(record.dump(left)).carves
+    assert again.keys() == left.carves.keys()
+    for number, carve in left.carves.items():
+        assert np.array_equal(again[number].tile(again[number].rim, 20.5), carve.tile(carve.rim, 20.5))
+        assert np.array_equal(again[number].tile(again[number].compression), carve.tile(carve.compression))
+
+
+def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
+    walker(scene, **DEEP)
+    _, left = bake(scene)
+    muted = min(left.carves)
+    name = step_id(left.footprints[muted])
+    heights = recompose(left.shaping)
+    step_edits.edit(scene, step_edits.editable(scene), {name: StepEdit(mute=True)})
+    without = baked_ground.record_of(scene.softground.ground)
+    assert len(without.shaping) == len(left.shaping) - 2
+    assert without.carves.keys() == left.carves.keys()
+    step_edits.edit(scene, step_edits.editable(scene), {})
+    again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
+    assert again.tiles.keys() == heights.tiles.keys()
+    assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
+
+
+def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
+    walker(scene)
+    bake(scene)  # which makes the ground
+    records = []
+    for is_on in (True, False):
+        scene.softground.carve = is_on
+        report, left = bake(scene)
+        assert not left.carves
+        assert "carved" not in report
+        records.append(left)
+    on, off = (record.dump(left.with_about({})) for left in records)
+    assert on == off
+    assert max(step.max_depth_m for step in records[0].footprints) < 0.09
+
+
+def test_without_sunk_feet_nothing_is_carved(scene):
+    walker(scene, **DEEP)
+    scene.softground.sink_feet = False
+    report, left = bake(scene)
+    assert not left.carves
+    assert "carved" not in report

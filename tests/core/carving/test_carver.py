@@ -1,0 +1,164 @@
+"""Cells that a body carves: nothing is lost, nothing heals, sand lies at its angle and mud stands."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softground_addon.core.carving.carver import REACH, CarvedCells, Walls
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.surfaces import SURFACES
+from softground_addon.core.pressing.repose import NEIGHBOURS, SWEEPS_TO_REST
+
+CELL = 0.01
+MATERIAL = GroundMaterial(youngs_modulus=1e5, poisson_ratio=0.1, characteristic_time=0.2, layer_depth=0.6)
+NOBODY = np.zeros(2)
+
+
+def walls_of(surface, angle=None):
+    walls = Walls.of(SURFACES[surface], MATERIAL, 9.81)
+    return walls if angle is None else Walls(walls.packing, walls.strength, np.radians(angle))
+
+
+def level(rows=60, columns=60):
+    nothing, flat = np.zeros((rows, columns), bool), np.zeros((rows, columns))
+    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full(flat.shape, np.inf), flat.copy())
+
+
+def block(cells, low, high, bottom):
+    """The underside of an upright block between two corners (row, column)."""
+    underside = np.full(cells.loose.shape, np.inf)
+    underside[low[0] : high[0], low[1] : high[1]] = bottom
+    return underside
+
+
+def steepest(surface):
+    """Steepest slope between neighbouring cells [degrees]."""
+    ways = [np.abs(surface[one] - surface[other]).max() / np.hypot(*way) for one, other, way in NEIGHBOURS]
+    return np.degrees(np.arctan(max(ways) / CELL))
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_a_block_cuts_its_own_volume_of_which_the_wall_takes_its_part(surface):
+    cells, walls = level(), walls_of(surface)
+    cells.cut(block(cells, (20, 25), (30, 40), -0.2), NOBODY, walls.packing)
+    assert cells.cut_height == pytest.approx(10 * 15 * 0.2, rel=1e-12)
+    assert cells.packed == pytest.approx(walls.packing * cells.cut_height, rel=1e-12)
+    assert cells.loose.sum() == pytest.approx((1.0 - walls.packing) * cells.cut_height, rel=1e-12)
+    assert cells.unplaced == 0.0
+    assert (cells.surface[20:30, 25:40] == -0.2).all(), "nothing is laid where the block is"
+    laid = np.argwhere(cells.loose > 0)
+    assert laid.min() > 20 - REACH / CELL - 1
+    assert laid.max() < 40 + REACH / CELL + 1
+
+
+def test_what_is_cut_goes_ahead_of_the_body():
+    cells = level()
+    cells.cut(block(cells, (25, 25), (35, 35), -0.1), np.array([0.05, 0.0]), 0.0)
+    rows, columns = np.indices(cells.loose.shape)
+    middle_row, middle_column = ((cells.loose * index).sum() / cells.loose.sum() for index in (rows, columns))
+    assert middle_row == pytest.approx(29.5, abs=0.05)
+    assert middle_column > 31.0
+
+
+def test_thin_layers_are_gathered_and_nothing_of_them_is_lost():
+    cells = level()
+    cells.loose[5:15, 5:15], cells.loose[20:30, 20:40] = 0.01, 0.0004
+    shown = np.zeros_like(cells.loose)
+    shown[25:30, 20:40] = 0.0006
+    total = cells.loose.sum()
+    cells.gather(shown, 0.001)
+    assert cells.loose.sum() == pytest.approx(total, rel=1e-12)
+    assert np.array_equal(cells.loose[20:30, 20:40], shown[20:30, 20:40])
+    assert cells.loose[5:15, 5:15] == pytest.approx(0.01 - 100 * 0.0002 / 100 + 100 * 0.0004 / 100, rel=1e-9)
+
+
+def test_without_room_what_is_cut_is_counted_as_unplaced():
+    cells = level(8, 8)
+    cells.cut(block(cells, (0, 0), (8, 8), -0.1), NOBODY, 0.25)
+    assert cells.unplaced == pytest.approx(0.75 * 64 * 0.1, rel=1e-12)
+    assert not cells.loose.any()
+
+
+def test_a_sole_that_presses_packs_what_lies_under_it_and_is_not_cut_by_its_own_skin():
+    cells = level()
+    cells.contact[10:20, 10:20] = True
+    cells.loose[:] = 0.01
+    cells.cut(block(cells, (10, 10), (20, 20), 0.004), NOBODY, 0.5)
+    assert cells.cut_height == 0.0
+    cells.pack()
+    assert cells.packed == pytest.approx(100 * 0.01, rel=1e-12)
+    assert not cells.loose[10:20, 10:20].any()
+
+
+@given(seed=st.integers(0, 2**32 - 1), surface=st.sampled_from(list(SURFACES)))
+@settings(max_examples=40, deadline=None)
+def test_whatever_bodies_do_nothing_is_lost_and_no_cut_heals(seed, surface):
+    rng = np.random.default_rng(seed)
+    cells, walls = level(40, 50), walls_of(surface)
+    cells.terrain = rng.normal(0, 0.02, (40, 1)).cumsum(axis=0) + np.zeros((40, 50))
+    cells.pressed = cells.terrain.copy()
+    cells.closed[:, 45:] = rng.random() < 0.5
+    volume, pressed = cells.surface.sum(), 0.0
+    for _ in range(6):
+        low = rng.integers(0, 30, 2)
+        high = low + rng.integers(1, 15, 2)
+        bottom = cells.terrain.min() - rng.uniform(-0.1, 0.4)
+        before, standing = cells.lowest.copy(), cells.standing.copy()
+        cells.cut(block(cells, low, high, bottom), rng.normal(0, 0.03, 2), walls.packing)
+        assert (cells.standing <= standing).all()
+        cells.slide(walls, np.zeros_like(cells.closed), (3, 4), 24)
+        if rng.random() < 0.5:
+            earlier = cells.surface.sum()
+            sole = np.zeros_like(cells.pressed)
+            sole[low[0] : high[0], low[1] : high[1]] = -rng.uniform(0, 0.3)
+            cells.press(cells.pressed + sole + rng.uniform(0, 0.01))
+            pressed += cells.surface.sum() - earlier
+        cells.contact = rng.random(cells.contact.shape) < 0.05
+        cells.pack()
+        assert (cells.lowest <= before).all()
+        assert (cells.loose >= 0).all()
+    assert cells.surface.sum() == pytest.approx(volume + pressed - cells.packed - cells.unplaced, rel=1e-9, abs=1e-9)
+
+
+def test_a_hole_in_dry_sand_becomes_a_funnel_no_steeper_than_its_angle():
+    cells, walls = level(120, 120), walls_of("sand", angle=32.0)
+    cells.cut(block(cells, (55, 55), (65, 65), -0.3), NOBODY, walls.packing)
+    cells.slide(walls, np.zeros_like(cells.closed), (0, 0), 20 * SWEEPS_TO_REST)
+    assert steepest(cells.surface) < 33.0
+    assert cells.surface.min() > -0.25, "its bottom fills"
+    assert cells.surface.sum() == pytest.approx(-cells.packed, rel=1e-9)
+
+
+@pytest.mark.parametrize(("surface", "depth"), [("mud", 0.4), ("snow", 0.5), ("soil", 0.4)])
+def test_walls_stand_that_their_cohesion_holds(surface, depth):
+    cells, walls = level(), walls_of(surface)
+    cells.cut(block(cells, (25, 25), (35, 35), -depth), NOBODY, 1.0)
+    before = cells.surface
+    cells.slide(walls, np.zeros_like(cells.closed), (0, 0), SWEEPS_TO_REST)
+    assert np.array_equal(cells.surface, before)
+
+
+def test_a_wall_falls_that_is_higher_than_its_cohesion_holds():
+    cells, walls = level(), walls_of("mud")
+    cells.cut(block(cells, (25, 25), (35, 35), -walls.strength - 0.2), NOBODY, 1.0)
+    cells.slide(walls, np.zeros_like(cells.closed), (0, 0), 4 * SWEEPS_TO_REST)
+    highest = max(np.abs(cells.surface[one] - cells.surface[other]).max() for one, other, _ in NEIGHBOURS)
+    assert highest < walls.strength + 0.02
+    assert cells.surface.sum() == pytest.approx(-cells.packed, rel=1e-9)
+
+
+def test_the_rim_of_a_later_print_rises_on_carved_ground():
+    cells = level()
+    cells.cut(block(cells, (20, 20), (30, 30), -0.2), NOBODY, 1.0)
+    volume = cells.surface.sum()
+    rim = np.zeros_like(cells.pressed)
+    rim[18:32, 18:32] = 0.01
+    cells.press(cells.pressed + rim)
+    assert cells.surface.sum() == pytest.approx(volume + rim.sum(), rel=1e-12)
+
+
+def test_a_wall_is_as_high_as_a_vertical_cut_may_be():
+    """Terzaghi: Hc = 4·c/(rho·g)·tan(45° + phi/2); of mud of 2 kPa and 1,700 kg/m³ at 15°, 0.625 m."""
+    assert walls_of("mud").strength == pytest.approx(4 * 2000 / (1700 * 9.81) * np.tan(np.radians(52.5)), rel=1e-12)
+    assert walls_of("sand").strength == 0.0
