@@ -17,16 +17,18 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
-from ...core.composers.pressed_shot import edit_findings, offsets_mm, press_shot
+from ...core.composers.pressed_shot import PressedShot, edit_findings, offsets_mm, press_shot
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import gap_table, response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
 from ...core.events.events import as_edited, events
 from ...core.files import report
 from ...core.findings import Finding
+from ...core.ground.soft_ground import SoftGround
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.motion.motion import shortest_sole
@@ -111,15 +113,7 @@ def bake(
 
     wanted = with_shoe_treads(wanted, shot.motions)
     frames = wanted.frames[1] - wanted.frames[0] + 1
-    pressing = press_shot(wanted, shot.motions, ground, edits, factors)
-    pressed = yield from counted(pressing, "simulate", frames)
-    responses = [(each.motion, each.response) for each in pressed.responses]
-    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
-    left = yield from meanwhile(Progress("simulate", 1.0), carving)
-    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
-    left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
-    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
-    marks = yield from meanwhile(Progress("simulate", 1.0), marking)
+    pressed, left, debris, marks = yield from _left(wanted, shot, ground, edits)
     footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
@@ -162,7 +156,7 @@ def bake(
     layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del pressed, pressing, responses, carving, throwing, marking, measuring, checking
+    del pressed, measuring, checking
     published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
@@ -186,6 +180,23 @@ def bake(
         sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
+
+
+def _left(
+    wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]
+) -> Job[tuple[PressedShot, record.BakeRecord, Debris | None, Marks | None]]:
+    """What a shot leaves: prints that soles press, what bodies carve, what steps throw, and marks on hard ground."""
+    factors = shot.surface.factors if shot.surface else None
+    pressing = press_shot(wanted, shot.motions, ground, edits, factors)
+    pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
+    responses = [(each.motion, each.response) for each in pressed.responses]
+    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
+    left = yield from meanwhile(Progress("simulate", 1.0), carving)
+    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
+    left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
+    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
+    marks = yield from meanwhile(Progress("simulate", 1.0), marking)
+    return pressed, left, debris, marks
 
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
