@@ -80,7 +80,7 @@ def test_the_skin_that_is_shown_passes_through_no_snow_and_all_that_it_cut_is_th
         after.append(in_the_ground(left.shaping, places, frame).max())
     print(f"\nskin in the ground: {np.round(before, 3)} m, carved {np.round(after, 3)} m; {report['carved']}")
     assert np.median(before) > 0.1
-    assert max(after) < CELL + 0.002
+    assert max(after) < 1.5 * CELL
     volumes = report["carved"][armature.name]
     assert 0.005 < volumes["cut_m3"] < 0.05
     assert report["totals"]["carved_m3"] == volumes["cut_m3"]
