@@ -197,8 +197,8 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    said_if_on = {"hard_grounds": len(inputs.get("hard_grounds", ())), "marks": inputs.get("marks", True)}
-    compared = {**inputs, "ground": "", "characters": nameless, **said_if_on}
+    whole = {"marks": True, "carve": False, "hard_grounds": (), **inputs}
+    compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
 

@@ -1,12 +1,15 @@
 """Legs carve deep ground: the skin that is shown passes through no snow, and what it cut is somewhere."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs
+from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.reading import staleness
 from softground_addon.core.carving import carves
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
@@ -24,6 +27,7 @@ def walker(scene, **material):
     bpy.ops.softground.add_character()
     options = scene.softground
     options.frame_end, options.sink_feet, options.pressure = FRAMES, True, "CENTRE_OF_PRESSURE"
+    options.carve = True
     for name, value in material.items():
         setattr(options.material, name, value)
     return armature
@@ -104,6 +108,9 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     without = baked_ground.record_of(scene.softground.ground)
     assert len(without.shaping) == len(left.shaping) - 2
     assert without.carves.keys() == left.carves.keys()
+    wanted = settings.snapshot(scene)
+    assert not staleness.reasons(scene, wanted)
+    assert staleness.reasons(scene, replace(wanted, carve=False)) == ("The settings have changed",)
     step_edits.edit(scene, step_edits.editable(scene), {})
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
