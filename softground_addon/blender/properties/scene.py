@@ -310,7 +310,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     carve: BoolProperty(
         name="Carve",
         description="Let legs and whatever else is in the ground carve it, where feet that are sunk go deeper than the "
-        "ankle. The bake takes two to three times as long, and a frame about twice",
+        "ankle. The bake takes two to three times as long",
         default=False,
     )
     has_layers: BoolProperty(

@@ -46,11 +46,10 @@ the outline of a shank has scallops of a millimetre."""
 MOST_POSES = 32
 """Most poses of a body in a frame."""
 SLIDES_EVERY, SWEEPS = 2, 8
-"""Loose matter slides after every so many frames, in so many sweeps (`repose.slid`); the rest goes on in the next."""
+"""Loose matter slides after every so many frames, in so many sweeps (`repose.slid`); the rest goes on in the next, and
+comes to rest once the leg is on its way to its next step."""
 LEAST = round(1e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
-SWEEPS_AFTER_STEP = 48
-"""The same once the leg is on its way to the next step; at the end of the shot, what has no cohesion comes to rest."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -65,6 +64,7 @@ class _Step:
     cut: float = 0.0
     packed: float = 0.0
     unplaced: float = 0.0
+    at_rest: bool = True
 
     @cached_property
     def begins(self) -> float:
@@ -158,12 +158,12 @@ def carves_of(
             around = next(body.poses)
             for step, left, triangles in body.parts(number):
                 if left is not None:
-                    carving.settle(left, frame, SWEEPS_AFTER_STEP)
+                    carving.settle(left, frame)
                 if step.is_deep:
                     carving.carve(step, around, triangles, frame)
     for step in steps.values():
         yield
-        carving.settle(step, float(frames[-1]), SWEEPS_AFTER_STEP if walls.strength else SWEEPS_TO_REST)
+        carving.settle(step, float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
 
 
@@ -297,15 +297,15 @@ class _Carving:
         shape = window.rows, window.columns
         return lowest_surface(poses.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
 
-    def settle(self, step: _Step, frame: float, sweeps: int) -> None:
-        """Let slide what a step has carved, and record all of it."""
-        if not step.recorder.frames:
+    def settle(self, step: _Step, frame: float) -> None:
+        """Let what a step has carved come to rest, and record all of it; nothing happens where it has."""
+        if step.at_rest or not step.recorder.frames:
             return
         window = step.recorder.window
         cells = self._cells(window)
         window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
         cells = self._cells(window)
-        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), sweeps)
+        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
         cells.gather(self._recorded.read(window)[1] * QUANTUM, LEAST * QUANTUM)
         self._keep(step, window, cells, frame, 1)
 
@@ -344,6 +344,7 @@ class _Carving:
 
     def _keep(self, step: _Step, window: Window, cells: CarvedCells, frame: float, least: int) -> None:
         """Write cells back, and record what of their changes comes to the least [QUANTUM]."""
+        step.at_rest = least == 1
         step.cut += cells.cut_height
         step.packed += cells.packed
         step.unplaced += cells.unplaced
