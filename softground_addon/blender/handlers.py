@@ -69,8 +69,9 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
 def _follow_deletion(scene: Any) -> None:
     ground = scene.softground.ground
     if ground is not None and not live.is_on():
+        is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
-            belongs.follow(ground, is_deleted=baked_ground.is_deleted(ground))
+            belongs.follow(ground, is_deleted=is_deleted)
 
 
 def _follow_weather_keys(scene: Any) -> None:

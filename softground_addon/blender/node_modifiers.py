@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import bpy
+
+from .compat import write_input
 
 
 def new_group(name: str, mark: str) -> Any:
@@ -28,6 +30,13 @@ def inputs_of(modifier: Any) -> dict[str, str]:
     """Identifier of each input of a modifier's node group, by its name."""
     sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
     return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
+
+
+def set_inputs(modifier: Any, values: Mapping[str, Any]) -> None:
+    """Set inputs of a modifier by their names, of those that its node group has."""
+    for name, identifier in inputs_of(modifier).items():
+        if name in values:
+            write_input(modifier, identifier, values[name])
 
 
 def nodes_of(modifier: Any) -> list[Any]:

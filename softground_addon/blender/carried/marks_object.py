@@ -15,7 +15,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with
+from ..node_modifiers import inputs_of, modifier_with, set_inputs
 from . import marks_nodes as nodes
 from .marks_material import material_for
 
@@ -104,14 +104,12 @@ def _play(modifier: Any, group: Any) -> None:
     """Have marks play a group, with what the artist has set."""
     if modifier.node_group == group:
         return
-    kept = {}
+    values = {name: value for name, value, *_ in nodes.INPUTS}
     if modifier.node_group:
-        kept = {name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if key}
+        kept = {name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if name in values}
+        values |= {name: value for name, value in kept.items() if value is not None}
     modifier.node_group = group
-    sockets = inputs_of(modifier)
-    for name, value, *_ in nodes.INPUTS:
-        if name in sockets:
-            compat.write_input(modifier, sockets[name], kept[name] if kept.get(name) is not None else value)
+    set_inputs(modifier, values)
 
 
 def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:

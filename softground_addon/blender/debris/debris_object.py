@@ -17,7 +17,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with
+from ..node_modifiers import inputs_of, modifier_with, set_inputs
 from ..settings import find, name_of
 from . import debris_nodes as nodes
 from . import debris_shapes
@@ -201,9 +201,7 @@ def _play(modifier: Any, group: Any) -> None:
         return
     values = _AT_FIRST | {"Shapes": _shapes_of(group)} | (_settings_of(modifier) if modifier.node_group else {})
     modifier.node_group = group
-    sockets = inputs_of(modifier)
-    for name, value in values.items():
-        compat.write_input(modifier, sockets[name], value)
+    set_inputs(modifier, values)
     _remove_unused()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.plants.bending import PLANTS
 from .. import compat, mesh_arrays
-from ..node_modifiers import inputs_of, named_by_nodes, nodes_of
+from ..node_modifiers import named_by_nodes, nodes_of, set_inputs
 from . import give_way_nodes as nodes
 from .trampling_table import modifier_of
 
@@ -60,9 +60,7 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
         "Sinks": not follows,
         "Loose Parts": obj.type == "MESH" and obj not in grounds and not len(instances),
     }
-    sockets = inputs_of(modifier)
-    for name, value in values.items():
-        compat.write_input(modifier, sockets[name], value)
+    set_inputs(modifier, values)
     obj.update_tag()
     return modifier
 
