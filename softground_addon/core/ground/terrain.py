@@ -28,6 +28,9 @@ LARGEST_TABLE = 1 << 21
 PLACES_AT_ONCE = 1 << 14
 """Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
 
+SLACK = 1e-8
+"""By which a triangle's box is wider than it, over its size: more than that of `triangles.barycentric`."""
+
 SAME_LAYER = 1e-3
 """Surfaces over one place that are closer than this are one [m]."""
 
@@ -51,6 +54,8 @@ class MeshTerrain:
         Where each bin's triangles start in `members`.
     members : (M,) int array
         Triangles by bin.
+    box : (4, T) float array
+        Least and greatest x, and y, of each triangle, with some slack: most of a bin's are told apart by it.
     values : (T, 3, C) float array
         What is said of the triangles' corners, if anything.
     """
@@ -61,6 +66,7 @@ class MeshTerrain:
     shape: Indices
     first: Indices
     members: Indices
+    box: Array
     values: Array
 
     @staticmethod
@@ -171,19 +177,23 @@ class MeshTerrain:
         pair, within = enumerated(stop - start)
         triangle = self.members[start[pair] + within]
         point = inside[pair]
+        for low, high, of_point in zip(self.box[::2], self.box[1::2], (x, y), strict=True):
+            at = of_point.take(point)
+            near = np.flatnonzero((at >= low.take(triangle)) & (at <= high.take(triangle)))
+            triangle, point = triangle.take(near), point.take(near)
         corners = self.corners[triangle]
         u, v, hit = barycentric(corners[..., :2], place[point])
         a, b, c = corners[..., 2].T
         return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
 
 
-def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices]]:
-    """Bins over the triangles (T, 3, 2): origin, size, shape, first and members, as in `MeshTerrain`."""
+def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices, Array]]:
+    """Bins over the triangles (T, 3, 2): origin, size, shape, first, members and box, as in `MeshTerrain`."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     origin = low.min(axis=0)
     extent = high.max(axis=0) - origin
-    bins_along = max(1.0, np.sqrt(len(corners) / 2))
-    size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
+    size = np.maximum(np.sqrt(2.0 * extent.prod() / len(corners)), (high - low).mean(axis=0))  # square over a long trail
+    size = np.maximum(np.minimum(size, extent), 1e-9)
     while True:
         yield
         shape = np.floor(extent / size).astype(np.intp) + 1
@@ -204,7 +214,9 @@ def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indice
     order = np.argsort(bin_index, kind="stable")
     yield
     first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
-    return origin, size, shape, first, triangle[order]
+    slack = SLACK * (high - low)
+    box = np.stack([low - slack, high + slack], axis=-1).reshape(-1, 4).T
+    return origin, size, shape, first, triangle[order], np.ascontiguousarray(box)
 
 
 class _Hits(NamedTuple):
