@@ -192,7 +192,9 @@ def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indice
     low, high = corners.min(axis=1), corners.max(axis=1)
     origin = low.min(axis=0)
     extent = high.max(axis=0) - origin
-    size = np.maximum(np.sqrt(2.0 * extent.prod() / len(corners)), (high - low).mean(axis=0))  # square over a long trail
+    size = np.maximum(
+        np.sqrt(2.0 * extent.prod() / len(corners)), (high - low).mean(axis=0)
+    )  # square over a long trail
     size = np.maximum(np.minimum(size, extent), 1e-9)
     while True:
         yield

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from .slices import Slices, sliced
+from .slices import Slices, result_of
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -43,6 +43,11 @@ class PackedArray(Generic[Number]):
     def __len__(self) -> int:
         return self._size
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [bytes]."""
+        return sum(map(len, self._parts))
+
     def extend(self, more: PackedArray[Number]) -> None:
         """Grow by another array of the same kind."""
         self._parts += more._parts
@@ -50,7 +55,7 @@ class PackedArray(Generic[Number]):
 
     def unpacked(self) -> NDArray[Number]:
         """The array as a new one."""
-        return sliced(self.unpacking)()
+        return result_of(self.unpacking())
 
     def unpacking(self) -> Slices[NDArray[Number]]:
         """What `unpacked` does, in slices."""
