@@ -106,7 +106,7 @@ class MeshTerrain:
             a, b, c = sides[triangles].T
             triangles = triangles[a & b & c == 0]
             yield
-        corners = vertices[triangles].astype(np.float64)
+        corners = vertices[triangles].astype(np.float64, copy=False)
         yield
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
@@ -116,7 +116,8 @@ class MeshTerrain:
             upward = normal[:, 2] < -steep
             corners, triangles = corners[:, ::-1], triangles[:, ::-1]
         yield
-        corners, triangles = corners[upward], triangles[upward]
+        if not upward.all():
+            corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(f"{name} has no face under the character's path to stand on: move it under the feet.")
         bins = yield from _bins(corners[..., :2])
@@ -189,7 +190,8 @@ class MeshTerrain:
 
 def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices, Array]]:
     """Bins over the triangles (T, 3, 2): origin, size, shape, first, members and box, as in `MeshTerrain`."""
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    low, high = (least(least(a, b), c) for least in (np.minimum, np.maximum))
     origin = low.min(axis=0)
     extent = high.max(axis=0) - origin
     size = np.maximum(
@@ -209,16 +211,17 @@ def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indice
             break
         size = size / 2
     triangle, within = enumerated(span.prod(axis=1))
-    bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
-    bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
     yield
-    bin_index = bin_y * shape[0] + bin_x
+    up, right = np.divmod(within, span[:, 0].take(triangle))
+    bin_index = (from_bin[:, 1] * shape[0] + from_bin[:, 0]).take(triangle) + up * shape[0] + right
+    yield
     order = np.argsort(bin_index, kind="stable")
     yield
     first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
     slack = SLACK * (high - low)
-    box = np.stack([low - slack, high + slack], axis=-1).reshape(-1, 4).T
-    return origin, size, shape, first, triangle[order], np.ascontiguousarray(box)
+    box = np.empty((4, len(corners)))
+    box[::2], box[1::2] = (low - slack).T, (high + slack).T
+    return origin, size, shape, first, triangle[order], box
 
 
 class _Hits(NamedTuple):
