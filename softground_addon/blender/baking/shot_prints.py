@@ -66,13 +66,18 @@ class ShotPrints:
     reported: Mapping[str, Any]
 
 
+def forget() -> None:
+    """Press anew at the next bake, and give back what is held for it."""
+    state.prints = None
+
+
 def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
     """What a shot leaves; errors as of `press_shot`."""
     source = yield from _source(wanted, shot, ground, edits)
     if source and state.prints and state.prints[0] == source:
         prints: ShotPrints = state.prints[1]
         return prints
-    state.prints = None  # room for those that come
+    forget()  # room for those that come
     prints = yield from _pressed(wanted, shot, ground, edits)
     if source and prints.marks is None and _size(prints) <= LARGEST:
         state.prints = source, prints

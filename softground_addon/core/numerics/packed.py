@@ -55,7 +55,7 @@ class PackedArray(Generic[Number]):
     @property
     def nbytes(self) -> int:
         """Memory that it takes [bytes]."""
-        return sum(memoryview(part).nbytes for part in self._parts)
+        return sum(len(part) if isinstance(part, bytes) else part.nbytes for part in self._parts)
 
     def extend(self, more: PackedArray[Number]) -> None:
         """Grow by another array of the same kind."""
