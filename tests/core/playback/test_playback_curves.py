@@ -155,6 +155,8 @@ def trodden(footprint, times):
 
 def test_ground_that_is_stepped_on_again_and_again_takes_less_memory_than_what_is_played(monkeypatch):
     monkeypatch.setattr("softground_addon.core.playback.playback_curves.CONTACTS_AT_ONCE", 1000)
+    monkeypatch.setattr("softground_addon.core.playback.playback_curves.SMALL", 0)  # as beyond a few megabytes
+    monkeypatch.setattr("softground_addon.core.playback.vertex_histories.ROOM", 0)
     _, footprints = pressed(walk(steps=2), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
     window, size = footprints[0].window, footprints[0].cell_size
     x, y = (grid.ravel() for grid in np.meshgrid(*window.centres(size)))
@@ -171,6 +173,19 @@ def test_ground_that_is_stepped_on_again_and_again_takes_less_memory_than_what_i
 
     (few, before), (many, after) = played_and_peak(6), played_and_peak(12)
     assert after - before < 0.5 * (many - few)
+
+
+def test_what_is_small_is_not_packed_and_plays_the_same(monkeypatch):
+    _, footprints = pressed(walk(steps=3), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
+    x, y = np.random.default_rng(4).uniform((-0.3, -0.3), (1.6, 0.3), (2000, 2)).T
+    spans, lines = playback_curves_at(footprints, x, y, blur_sigma=0.005, frame_rate=RATE)
+    monkeypatch.setattr("softground_addon.core.playback.playback_curves.SMALL", 0)
+    monkeypatch.setattr("softground_addon.core.playback.vertex_histories.ROOM", 0)
+    its_spans, packed = playback_curves_at(footprints, x, y, blur_sigma=0.005, frame_rate=RATE)
+    assert packed.position.nbytes < lines.position.nbytes
+    np.testing.assert_array_equal(packed.position.unpacked(), lines.position.unpacked())
+    np.testing.assert_array_equal(packed.contact.unpacked(), lines.contact.unpacked())
+    np.testing.assert_array_equal(its_spans.offset, spans.offset)
 
 
 def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_stays_away():
