@@ -69,6 +69,30 @@ def test_a_trail_that_is_fine_does_not_crowd_the_bins_of_what_is_coarse_beside_i
     assert (terrain.first[number + 1] - terrain.first[number]).mean() < 50
 
 
+def test_bins_over_a_long_trail_hold_no_more_than_those_over_a_square():
+    """Bins as long as the trail over its breadth would hold a row of triangles each."""
+    x, y = np.linspace(0.0, 1.0, 51), np.linspace(0.0, 100.0, 5001)
+    vertices = np.stack([*map(np.ravel, np.meshgrid(x, y)), np.zeros(len(x) * len(y))], axis=-1)
+    corner = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
+    right, above = corner + 1, corner + len(x)
+    triangles = np.concatenate([np.stack([corner, right, above], -1), np.stack([right, above + 1, above], -1)])
+    terrain = MeshTerrain.from_mesh(vertices, triangles)
+    assert np.diff(terrain.first).mean() < 15
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_places_on_corners_and_edges_are_on_the_surface(seed):
+    random = np.random.default_rng(seed)
+    vertices = random.uniform(-1, 1, (60, 3)) * [1.0, 1.0, 0.1]
+    triangles = counter_clockwise(vertices, Delaunay(vertices[:, :2]).simplices.astype(np.intp))
+    terrain = MeshTerrain.from_mesh(vertices, triangles)
+    corners = terrain.corners
+    share = random.uniform(0, 1, (len(corners), 1))
+    for places in (*np.moveaxis(corners, 1, 0), corners[:, 0] + share * (corners[:, 1] - corners[:, 0])):
+        np.testing.assert_array_less(places[:, 2] - 1e-9, terrain.heights(*places[:, :2].T))
+
+
 def slab(z):
     vertices = np.array([[x, y, h] for h in (z - 1.0, z) for y in (0.0, 2.0) for x in (0.0, 2.0)])
     top, bottom = [[4, 5, 7], [4, 7, 6]], [[0, 3, 1], [0, 2, 3]]

@@ -51,7 +51,7 @@ def test_what_an_earlier_version_has_stored_is_lifted_to_the_newest(monkeypatch)
     lift = {record.FORMAT: lambda text, arrays: (text | {"about": {"cell_size_m": text["about"]["cell_size"]}}, arrays)}
     monkeypatch.setattr(record, "MIGRATIONS", record.MIGRATIONS | lift)
     monkeypatch.setattr(record, "FORMAT", record.FORMAT + 1)
-    assert record.load(stored).about == {"cell_size_m": 1.0}
+    assert record.load(stored).about == record.load_edits(stored)[0] == {"cell_size_m": 1.0}
 
 
 @pytest.mark.parametrize("version", [0, record.FORMAT + 1, "2", None])
@@ -59,6 +59,8 @@ def test_a_record_of_an_unknown_version_is_refused_with_what_to_do(version):
     stored = with_text(record.dump(BakeRecord([], {})), format=version)
     with pytest.raises(InputError, match=f"version {version}.*update SoftGround"):
         record.load(stored)
+    with pytest.raises(InputError, match=f"version {version}.*update SoftGround"):
+        record.load_edits(stored)
 
 
 def test_edits_come_back_beside_the_footprints(footprints):
@@ -68,6 +70,7 @@ def test_edits_come_back_beside_the_footprints(footprints):
     }
     loaded = record.load(record.dump(BakeRecord(footprints, {"cell_size": 0.01}, edits)))
     assert loaded.edits == edits
+    assert record.load_edits(record.dump(loaded)) == ({"cell_size": 0.01}, edits)
     assert len(loaded.footprints) == len(footprints)
     assert record.dump(loaded) == record.dump(BakeRecord(footprints, {"cell_size": 0.01}, edits))
 
@@ -76,6 +79,8 @@ def test_edits_come_back_beside_the_footprints(footprints):
 def test_a_record_with_forged_edits_is_refused(edits):
     with pytest.raises(InputError, match="edits of steps"):
         record.load(with_text(record.dump(BakeRecord([], {})), edits=edits))
+    with pytest.raises(InputError, match="edits of steps"):
+        record.load_edits(with_text(record.dump(BakeRecord([], {})), edits=edits))
 
 
 def test_the_ground_is_made_without_a_muted_step(footprints):
