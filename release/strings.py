@@ -37,14 +37,14 @@ _CALLS = {"translated": 0, "report": 1, "InputError": 0, "status_text_set": 0}
 """Functions that are given a text, and the place of it."""
 _REASONS = ("why_no_start", "_why_not")
 """Functions that return a text to show."""
-_AS_IT_IS = ("SoftGround", "m/s", "[Esc]")
+AS_IT_IS = ("SoftGround", "m/s", "[Esc]")
 """Texts that are the same in all languages."""
 
 
 def shown() -> set[str]:
     """All texts of the interface, in English; the add-on is registered."""
     texts = {text.strip() for text in (*_registered(), *_in_code(), *_in_tables())}
-    return {text for text in texts if re.search("[a-z]{2}", text) and text not in _AS_IT_IS}
+    return {text for text in texts if re.search("[a-z]{2}", text) and text not in AS_IT_IS}
 
 
 def _registered() -> Iterator[str]:

@@ -62,5 +62,30 @@ def test_nothing_is_left_once_the_add_on_is_off(facts):
     assert facts["switched off"] == facts["at first"]["texts"]
 
 
+IN_GERMAN = """
+import bpy
+bpy.context.preferences.view.language = "de_DE"
+bpy.ops.preferences.addon_disable(module="bl_ext.user_default.softground")
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.softground")
+bpy.ops.softground.report_bug()
+try:
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.ops.softground.bake()
+except RuntimeError as error:
+    print(error)
+"""
+
+
+def test_reports_and_reasons_are_in_the_language_that_blender_starts_with(suite):
+    conftest.installed(suite)
+    printed = conftest.blender(suite, "run", "-b", "--python-expr", IN_GERMAN)
+    german = own("de_DE")
+    for text in (
+        "Copied the details: paste them into your report, below what you did and what happened",
+        "Add a character first: select its armature and press Add Character",
+    ):
+        assert german[text] in printed
+
+
 def test_nothing_goes_wrong_on_the_console(facts):
     assert "softground_addon" not in facts["printed"]
