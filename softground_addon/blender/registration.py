@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import handlers, properties, session, state
+from . import handlers, properties, session, state, translation
 from .command_line import cli
 from .ground import look
 from .importing import import_capture
@@ -102,6 +102,8 @@ def register() -> None:
         for part in (handlers, menus, help, import_capture):
             part.register()
             undo.callback(part.unregister)
+        translation.watch()
+        undo.callback(translation.unregister)
         state.state.hooks.update(
             follow_look=_follow_look,
             show_depth_cm=prediction.shown_cm,

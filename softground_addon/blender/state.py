@@ -58,6 +58,8 @@ class State:
         through the collections takes too long to be done in `draw`; who leaves one has a user less.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
+    catalogues : dict
+        Translations by context and English text, of each language that Blender's interface has had.
     """
 
     is_baking: bool = False
@@ -87,6 +89,7 @@ class State:
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
+    catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 
 
 state = State()

@@ -15,6 +15,7 @@ from ..ground import painted_ground
 from ..operators import prediction
 from ..operators.character_editing import active_character
 from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..translation import translated
 
 
 class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
@@ -167,14 +168,31 @@ class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
 
 def vertices(wanted: float, most: int) -> str:
     """Vertices of a close-up along all of a trail, and if there may be fewer."""
-    text = f"About {rounded(wanted):,.0f} vertices along the whole trail"
-    return text if wanted <= most else f"{text}, over Max Vertices"
+    count = f"{rounded(wanted):,.0f}"
+    if wanted <= most:
+        return translated("About {count} vertices along the whole trail", count=count)
+    return translated("About {count} vertices along the whole trail, over Max Vertices", count=count)
 
 
 def estimate(coverage: Coverage, fine: Fineness) -> str:
     """Cells that a bake changes, and the memory and time that it takes."""
     cells, (memory, time) = coverage.cells(fine.cell_size, fine.rim_reach), coverage.bake_costs(fine)
-    return f"About {rounded(cells):,.0f} cells, {rounded(memory / 1e6):,.0f} MB, {duration(time)}"
+    return translated(
+        "About {cells} cells, {memory} MB, {time}",
+        cells=f"{rounded(cells):,.0f}",
+        memory=f"{rounded(memory / 1e6):,.0f}",
+        time=lasting(time),
+    )
+
+
+def lasting(time: float) -> str:
+    """A time [s] as it is said, in the language of the interface."""
+    count, unit = duration(time).split()
+    return translated(DURATIONS[unit], count=count)
+
+
+DURATIONS = {"seconds": "{count} seconds", "minutes": "{count} minutes", "hours": "{count} hours"}
+"""Times as they are said, by their units."""
 
 
 def rounded(value: float) -> float:

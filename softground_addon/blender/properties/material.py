@@ -12,6 +12,7 @@ from ...core.ground import presets
 from ...core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ...core.ground.surfaces import SURFACES
 from ..state import state
+from ..translation import CONTEXT
 from .fields import in_unit
 
 USUAL_PACKING = 0.6
@@ -262,6 +263,7 @@ class SoftGroundPainted(bpy.types.PropertyGroup):
     )
     rim: StringProperty(
         name="Rim",
+        translation_context=CONTEXT,
         description="Vertex group or float attribute that multiplies the volume of the rims: 1 leaves "
         "it as set, 0 raises no rim",
         default="softground_rim_factor",
