@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
 from . import session, translation, tread_images
+from .baking import shot_prints
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -136,6 +137,7 @@ def before_load(*_: Any) -> None:
         live.forget()
     analysis.forget()
     tread_images.forget()
+    shot_prints.forget()
 
 
 @persistent

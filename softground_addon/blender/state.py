@@ -56,6 +56,8 @@ class State:
     existing : dict
         Number of users of each object when it was last looked for in the collections, and True if it was in one. Going
         through the collections takes too long to be done in `draw`; who leaves one has a user less.
+    prints : tuple or None
+        What the last bake left, after a hash of all that it follows from; see `baking.shot_prints`.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
     catalogues : dict
@@ -88,6 +90,7 @@ class State:
     presets: dict[Path, Any] = field(default_factory=dict)
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
+    prints: tuple[str, Any] | None = None
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
     catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 

@@ -39,7 +39,7 @@ def of_file() -> dict[str, Any]:
 def of_mesh(mesh: bpy.types.Mesh) -> dict[str, Any]:
     keys = mesh.shape_keys
     return {
-        "attributes": {a.name: (a.domain, a.data_type, _attribute_bytes(a)) for a in mesh.attributes},
+        "attributes": {a.name: (a.domain, a.data_type, of_attribute(a)) for a in mesh.attributes},
         "active_attribute": mesh.attributes.active_index,
         "shape_keys": {k.name: (k.value, k.mute, _points(k)) for k in keys.key_blocks} if keys else None,
         "materials": [m.name if m else None for m in mesh.materials],
@@ -88,7 +88,7 @@ def of_action(action: bpy.types.Action) -> list[Any]:
     return [curves, _properties(action), action.users]
 
 
-def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
+def of_attribute(attribute: bpy.types.Attribute) -> bytes:
     field, kind, width = _VALUE_FIELDS[attribute.data_type]
     values = np.empty(len(attribute.data) * width, dtype=kind)
     attribute.data.foreach_get(field, values)

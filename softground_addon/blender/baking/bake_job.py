@@ -17,18 +17,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks
-from ...core.carving.carves import with_carves
-from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
-from ...core.composers.pressed_shot import PressedShot, edit_findings, offsets_mm, press_shot
+from ...core.composers.pressed_shot import edit_findings
 from ...core.composers.relief_plan import with_shoe_treads
-from ...core.composers.responses import gap_table, response_findings, suggested_speeds, worst_gaps
+from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
-from ...core.events.events import as_edited, events
+from ...core.events.events import as_edited
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground.soft_ground import SoftGround
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.motion.motion import shortest_sole
@@ -42,15 +38,16 @@ from ..carried import marks_object
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
-from ..jobs import Job, Progress, counted, meanwhile
+from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of, read_shot, settings_of
 from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
 from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
-from .publish import Published, at_the_end, marks_left, publish, sign, with_debris
+from .publish import Published, at_the_end, publish, sign
 from .scene_findings import scene_findings
+from .shot_prints import shot_prints
 
 Array = NDArray[np.float64]
 
@@ -113,30 +110,17 @@ def bake(
 
     wanted = with_shoe_treads(wanted, shot.motions)
     frames = wanted.frames[1] - wanted.frames[0] + 1
-    pressed, left, debris, marks = yield from _left(wanted, shot, ground, edits)
+    prints = yield from shot_prints(wanted, shot, ground, edits)
+    left, debris, marks, happened = prints.left, prints.debris, prints.marks, prints.happened
     footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
-    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, left.edited)
-    gaps = yield from meanwhile(Progress("simulate", 1.0), measuring)
     inputs = wanted.inputs()
     if factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
-    name = wanted.ground.name if wanted.ground else "the ground"
-    checking = self_check.slices(pressed.loads, footprints, shot.terrain, wanted.cell_size_m, name)
-    findings = [
-        *(yield from meanwhile(Progress("simulate", 1.0), checking)),
-        *bottomed_out(footprints, wanted.material, name),
-        *said,
-        *edit_findings(left),
-        *response_job.keyed_responses(wanted),
-    ]
-    of_responses = response_findings(pressed.responses)
-    happened = yield from meanwhile(
-        Progress("simulate", 1.0),
-        events.slices(pressed.loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0]),
-    )
+    findings = [*prints.findings, *said, *edit_findings(left), *response_job.keyed_responses(wanted)]
+    of_responses = response_findings(prints.responses)
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -144,19 +128,17 @@ def bake(
         steps=left.steps,
         carves=left.carves,
         edits=left.edits,
-        offsets_mm=offsets_mm(pressed.loads),
-        forces=pressed.forces,
-        gaps_mm=gaps,
-        worst_gaps=worst_gaps(pressed.responses),
+        **prints.reported,
+        worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
         events=as_edited(happened, left.steps),
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
-    layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
+    layers = (yield from response_job.layers_of(wanted, shot.rigs, prints.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del pressed, measuring, checking
+    del prints
     published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
@@ -180,23 +162,6 @@ def bake(
         sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
-
-
-def _left(
-    wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]
-) -> Job[tuple[PressedShot, record.BakeRecord, Debris | None, Marks | None]]:
-    """What a shot leaves: prints that soles press, what bodies carve, what steps throw, and marks on hard ground."""
-    factors = shot.surface.factors if shot.surface else None
-    pressing = press_shot(wanted, shot.motions, ground, edits, factors)
-    pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
-    responses = [(each.motion, each.response) for each in pressed.responses]
-    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
-    left = yield from meanwhile(Progress("simulate", 1.0), carving)
-    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
-    left, debris = yield from meanwhile(Progress("simulate", 1.0), throwing)
-    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
-    marks = yield from meanwhile(Progress("simulate", 1.0), marking)
-    return pressed, left, debris, marks
 
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:

@@ -295,13 +295,13 @@ def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str
     `names` are those that its characters have now, if the ids are to have these.
     """
     try:
-        left = record_of(ground)
+        about, edits = record.load_edits(bytes(stored_record(ground)))
     except InputError:
         return {}
     with suppress(KeyError, TypeError, ValueError):  # of damaged inputs, and where there are more or fewer by now
-        before = [str(character["name"]) for character in left.about["inputs"]["characters"]]
-        return with_names(left.edits, dict(zip(before, names, strict=True)))
-    return left.edits
+        before = [str(character["name"]) for character in about["inputs"]["characters"]]
+        return with_names(edits, dict(zip(before, names, strict=True)))
+    return edits
 
 
 def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:

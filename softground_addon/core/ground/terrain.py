@@ -28,6 +28,9 @@ LARGEST_TABLE = 1 << 21
 PLACES_AT_ONCE = 1 << 14
 """Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
 
+SLACK = 1e-8
+"""By which a triangle's box is wider than it, over its size: more than that of `triangles.barycentric`."""
+
 SAME_LAYER = 1e-3
 """Surfaces over one place that are closer than this are one [m]."""
 
@@ -51,6 +54,8 @@ class MeshTerrain:
         Where each bin's triangles start in `members`.
     members : (M,) int array
         Triangles by bin.
+    box : (4, T) float array
+        Least and greatest x, and y, of each triangle, with some slack: most of a bin's are told apart by it.
     values : (T, 3, C) float array
         What is said of the triangles' corners, if anything.
     """
@@ -61,6 +66,7 @@ class MeshTerrain:
     shape: Indices
     first: Indices
     members: Indices
+    box: Array
     values: Array
 
     @staticmethod
@@ -100,7 +106,7 @@ class MeshTerrain:
             a, b, c = sides[triangles].T
             triangles = triangles[a & b & c == 0]
             yield
-        corners = vertices[triangles].astype(np.float64)
+        corners = vertices[triangles].astype(np.float64, copy=False)
         yield
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
@@ -110,7 +116,8 @@ class MeshTerrain:
             upward = normal[:, 2] < -steep
             corners, triangles = corners[:, ::-1], triangles[:, ::-1]
         yield
-        corners, triangles = corners[upward], triangles[upward]
+        if not upward.all():
+            corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(f"{name} has no face under the character's path to stand on: move it under the feet.")
         bins = yield from _bins(corners[..., :2])
@@ -171,19 +178,26 @@ class MeshTerrain:
         pair, within = enumerated(stop - start)
         triangle = self.members[start[pair] + within]
         point = inside[pair]
+        for low, high, of_point in zip(self.box[::2], self.box[1::2], (x, y), strict=True):
+            at = of_point.take(point)
+            near = np.flatnonzero((at >= low.take(triangle)) & (at <= high.take(triangle)))
+            triangle, point = triangle.take(near), point.take(near)
         corners = self.corners[triangle]
         u, v, hit = barycentric(corners[..., :2], place[point])
         a, b, c = corners[..., 2].T
         return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
 
 
-def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices]]:
-    """Bins over the triangles (T, 3, 2): origin, size, shape, first and members, as in `MeshTerrain`."""
-    low, high = corners.min(axis=1), corners.max(axis=1)
+def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices, Array]]:
+    """Bins over the triangles (T, 3, 2): origin, size, shape, first, members and box, as in `MeshTerrain`."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    low, high = (least(least(a, b), c) for least in (np.minimum, np.maximum))
     origin = low.min(axis=0)
     extent = high.max(axis=0) - origin
-    bins_along = max(1.0, np.sqrt(len(corners) / 2))
-    size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
+    size = np.maximum(
+        np.sqrt(2.0 * extent.prod() / len(corners)), (high - low).mean(axis=0)
+    )  # square over a long trail
+    size = np.maximum(np.minimum(size, extent), 1e-9)
     while True:
         yield
         shape = np.floor(extent / size).astype(np.intp) + 1
@@ -197,14 +211,17 @@ def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indice
             break
         size = size / 2
     triangle, within = enumerated(span.prod(axis=1))
-    bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
-    bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
     yield
-    bin_index = bin_y * shape[0] + bin_x
+    up, right = np.divmod(within, span[:, 0].take(triangle))
+    bin_index = (from_bin[:, 1] * shape[0] + from_bin[:, 0]).take(triangle) + up * shape[0] + right
+    yield
     order = np.argsort(bin_index, kind="stable")
     yield
     first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
-    return origin, size, shape, first, triangle[order]
+    slack = SLACK * (high - low)
+    box = np.empty((4, len(corners)))
+    box[::2], box[1::2] = (low - slack).T, (high + slack).T
+    return origin, size, shape, first, triangle[order], box
 
 
 class _Hits(NamedTuple):

@@ -8,12 +8,15 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from .slices import Slices, sliced
+from .slices import Slices, result_of
 
 Number = TypeVar("Number", bound=np.generic)
 
 LEVEL = 1
 """Level of zlib: higher ones take longer than a look at a footprint, and gain little."""
+
+SMALL = 8192
+"""Fields of which less is packed [bytes] are left as they are."""
 
 
 class PackedArray(Generic[Number]):
@@ -23,6 +26,8 @@ class PackedArray(Generic[Number]):
     ----------
     first : (N, ...) array
         Its first values, which all others are like.
+    is_small : bool
+        True to leave them as they are: compressing takes longer than what is made of few values.
 
     Examples
     --------
@@ -34,14 +39,23 @@ class PackedArray(Generic[Number]):
 
     __slots__ = ("_kind", "_parts", "_row", "_size")
 
-    def __init__(self, first: NDArray[Number]) -> None:
+    def __init__(self, first: NDArray[Number], *, is_small: bool = False) -> None:
         self._kind, self._row, self._size = first.dtype, first.shape[1:], len(first)
+        whole = np.ascontiguousarray(first)
+        self._parts: list[bytes | NDArray[Number]] = [whole if whole.base is None else whole.copy()]
+        if is_small:
+            return
         # Of neighbours, the high bytes are much the same and the low ones noise: each kind for itself packs better.
-        by_significance = np.ascontiguousarray(_bytes_of(np.ascontiguousarray(first)).T)
+        by_significance = np.ascontiguousarray(_bytes_of(whole).T)
         self._parts = [zlib.compress(by_significance.data, LEVEL)]
 
     def __len__(self) -> int:
         return self._size
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [bytes]."""
+        return sum(len(part) if isinstance(part, bytes) else part.nbytes for part in self._parts)
 
     def extend(self, more: PackedArray[Number]) -> None:
         """Grow by another array of the same kind."""
@@ -50,17 +64,21 @@ class PackedArray(Generic[Number]):
 
     def unpacked(self) -> NDArray[Number]:
         """The array as a new one."""
-        return sliced(self.unpacking)()
+        return result_of(self.unpacking())
 
     def unpacking(self) -> Slices[NDArray[Number]]:
         """What `unpacked` does, in slices."""
         whole: NDArray[Number] = np.empty((self._size, *self._row), self._kind)
-        content, first = _bytes_of(whole), 0
-        for part in map(zlib.decompress, self._parts):
-            planes = np.frombuffer(part, np.uint8).reshape(self._kind.itemsize, -1)
-            end = first + planes.shape[1]
-            for significance, plane in enumerate(planes):  # many times faster than all at once
-                content[first:end, significance] = plane
+        values, content, first = whole.reshape(-1), _bytes_of(whole), 0
+        for part in self._parts:
+            if isinstance(part, bytes):
+                planes = np.frombuffer(zlib.decompress(part), np.uint8).reshape(self._kind.itemsize, -1)
+                end = first + planes.shape[1]
+                for significance, plane in enumerate(planes):  # many times faster than all at once
+                    content[first:end, significance] = plane
+            else:
+                end = first + part.size
+                values[first:end] = part.ravel()
             first = end
             yield
         return whole
@@ -98,4 +116,4 @@ class Packed(Generic[Number]):
         return getattr(holder, self._name).unpacked()
 
     def __set__(self, holder: object, values: NDArray[Number]) -> None:
-        object.__setattr__(holder, self._name, PackedArray(values))
+        object.__setattr__(holder, self._name, PackedArray(values, is_small=values.nbytes < SMALL))

@@ -45,6 +45,9 @@ TICK = 2.0**-14
 CONTACTS_AT_ONCE = 5_000
 """Footprints' cells over places whose histories are computed together: some ten megabytes."""
 
+SMALL = 1 << 19
+"""Points of curves up to which they are not packed: eight megabytes."""
+
 PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
 
@@ -150,10 +153,11 @@ def playback_curves_at(
             in_blocks=in_blocks,
         )
         yield
-        spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)
+        is_small = len(position) < SMALL
+        spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch, is_small=is_small)
         part = replace(spans, point=places[spans.point], curve=spans.curve + np.int32(count))
         for name, packed in whole.items():
-            packed.extend(PackedArray(getattr(part, name)))
+            packed.extend(PackedArray(getattr(part, name), is_small=is_small))
         position.extend(lines.position)
         contact.extend(lines.contact)
         sizes.append(lines.size)
@@ -196,8 +200,8 @@ def _relief_of_parts(
         yield reliefs
 
 
-def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, PlaybackCurves]:
-    """The vertex histories as curves; frames per second give the time since a contact.
+def curves(over_time: VertexHistories, frame_rate: float, *, is_small: bool = False) -> tuple[Spans, PlaybackCurves]:
+    """The vertex histories as curves; frames per second give the time since a contact. `is_small` as of `PackedArray`.
 
     Examples
     --------
@@ -241,7 +245,7 @@ def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, Playba
     )
     sizes = np.bincount(curve, size).astype(np.intp)
     contact = _contact(table, rows, when, frame_rate)
-    return spans, PlaybackCurves(sizes, PackedArray(position), PackedArray(contact))
+    return spans, PlaybackCurves(sizes, *(PackedArray(values, is_small=is_small) for values in (position, contact)))
 
 
 def _end_to_end(length: Array) -> tuple[Indices, Array]:

@@ -65,9 +65,15 @@ class Ramps:
 
 def joined(parts: Sequence[Intervals]) -> Intervals:
     """One set of intervals of points from at least one set, by point and time."""
+    whole = side_by_side(parts)
+    order = np.lexsort((whole.start, whole.point))
+    return replace(whole, **{field.name: getattr(whole, field.name)[order] for field in fields(whole)})
+
+
+def side_by_side(parts: Sequence[Intervals]) -> Intervals:
+    """The same in the order of the sets."""
     whole = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(parts[0])}
-    order = np.lexsort((whole["start"], whole["point"]))
-    return type(parts[0])(**{name: values[order] for name, values in whole.items()})
+    return replace(parts[0], **whole)
 
 
 @dataclass(frozen=True)
@@ -129,7 +135,7 @@ def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
 def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float]) -> Ramps:
     """Ramps that also bring points (N,) a change (N, C), as these points move: each ramp its part of it.
 
-    Points without a ramp take theirs over a span of frames.
+    Points without a ramp take theirs over a span of frames; theirs come last.
 
     Examples
     --------
@@ -147,7 +153,7 @@ def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float
     more = replace(ramps, change=ramps.change + share[:, None] * whole[ramps.point])
     still = points[length[points] == 0]
     start, end = (np.full(len(still), frame) for frame in span)
-    return Ramps.joined([more, Ramps(still, start, end, whole[still])], change.shape[1])
+    return side_by_side([more, Ramps(still, start, end, whole[still])])
 
 
 def _ends_of_movements(values: Array) -> NDArray[np.bool_]:

@@ -20,7 +20,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief.steps import NOTHING, StepRelief
 from .blocks import BLOCK, ChangesInBlocks
-from .ramps import TOLERANCE, Ramps, fit, grown, joined
+from .ramps import TOLERANCE, Ramps, fit, grown, joined, side_by_side
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -28,6 +28,10 @@ Indices = NDArray[np.intp]
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
 
+FEW = 8
+"""Footprints near places up to which their changes are not packed: some megabytes."""
+
+_NO_RAMPS = Ramps.joined([], 2)
 
 CARVED_TOLERANCE = 5e-3
 """Largest error of ground that bodies carve, while it moves [m]: loose matter that slides to and fro has no edge."""
@@ -116,7 +120,7 @@ def vertex_histories(
     for number in in_blocks.keys() - set(near):
         del in_blocks[number]
     for number in near:
-        in_blocks.setdefault(number, ChangesInBlocks(footprints[number]))
+        in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_alone=len(near) <= FEW))
     footprints = [footprints[number] for number in near]
     reliefs = [relief[number] if relief else NOTHING for number in near]
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
@@ -142,7 +146,7 @@ def vertex_histories(
             yield
         if len(its_relief.point):
             span = spans[number, 0], spans[number, 1]
-            of_step = [grown(Ramps.joined(of_step, 2), its_relief.point, its_relief.change, span)]
+            of_step = [grown(side_by_side([_NO_RAMPS, *of_step]), its_relief.point, its_relief.change, span)]
         movements += of_step
         contacts.append(_point_contacts(footprint, places))
         yield

@@ -202,19 +202,8 @@ def load(content: bytes) -> BakeRecord:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members.check_directory(archive, len(content))
-            stored = members.read(archive, _TEXT, members.LARGEST_TEXT)
-            text = json.loads(stored)
-            if b"\\u" in stored:  # half a character, which nothing can be written with
-                json.dumps(text, ensure_ascii=False).encode()
+            text = _text(archive, len(content))
             version = text["format"]
-            if version != FORMAT and version not in MIGRATIONS:
-                raise InputError(
-                    f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
-                    f"to {FORMAT}: bake again, or update SoftGround."
-                )
-            if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
-                raise ValueError("it has parts that no record has")
             arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in ARRAYS}
         for older in range(version, FORMAT):
             text, arrays = MIGRATIONS[older](text, arrays)
@@ -227,15 +216,55 @@ def load(content: bytes) -> BakeRecord:
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
-        raise InputError(
-            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
-        ) from None
-    changes = step_edits.from_json(edits, "The stored record's edits of steps")
+        raise _damaged(error) from None
+    changes = step_edits.from_json(edits, _EDITS)
     footprints = from_arrays(names, soles, arrays)
     prints = iter(footprints[baked:])
     pressed_again = {number: next(prints) if has_print else None for number, has_print in again}
     carves = dict(zip(carved, prints, strict=True))
     return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves)
+
+
+def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.StepEdit]]:
+    """What is known about the footprints in such bytes, and the artist's edits of them; errors as of `load`.
+
+    The footprints themselves are not unpacked.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            text = _text(archive, len(content))
+        about, edits = dict(text["about"]), text["edits"]
+        if text["format"] != FORMAT:
+            left = load(content)
+            return dict(left.about), dict(left.edits)
+    except _DAMAGE as error:
+        raise _damaged(error) from None
+    return about, step_edits.from_json(edits, _EDITS)
+
+
+_EDITS = "The stored record's edits of steps"
+
+
+def _damaged(error: BaseException) -> InputError:
+    return InputError(f"The stored record of the footprints is damaged ({error}): clear the bake and bake again.")
+
+
+def _text(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
+    """The JSON text of a record of that size [bytes]; InputError if it is of a later version."""
+    members.check_directory(archive, size)
+    stored = members.read(archive, _TEXT, members.LARGEST_TEXT)
+    text: dict[str, Any] = json.loads(stored)
+    if b"\\u" in stored:  # half a character, which nothing can be written with
+        json.dumps(text, ensure_ascii=False).encode()
+    version = text["format"]
+    if version != FORMAT and version not in MIGRATIONS:
+        raise InputError(
+            f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
+            f"to {FORMAT}: bake again, or update SoftGround."
+        )
+    if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
+        raise ValueError("it has parts that no record has")
+    return text
 
 
 def _thrown(rows: list[Any], baked: int) -> dict[int, dict[str, float]]:

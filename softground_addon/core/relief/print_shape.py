@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +109,7 @@ class PrintShape:
         corner = low * self.window.columns + first
         flat = fields.reshape(len(fields), -1)
         above = corner + self.window.columns
-        around = (flat[:, at] for at in (corner, corner + 1, above, above + 1))
+        around = (flat.take(at, axis=1) for at in (corner, corner + 1, above, above + 1))
         return np.asarray(bilinear.between(around, np.asarray(column - first), np.asarray(row - low)))
 
     def under_sole(self, x: Array, y: Array) -> tuple[Array, Array]:
@@ -154,7 +155,7 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
 
 def _outline(inside: Mask, far: int) -> Array:
     """Distance of cells to the outline of a print, positive inside, up to `far` [cells]."""
-    to_print, to_ground = nearest(inside, far)[0], nearest(~inside, far)[0]
+    to_print, to_ground = distance_to(inside, far), distance_to(~inside, far)
     return _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0))
 
 
@@ -165,7 +166,7 @@ def _displayed(
     displayed, risen = (_blurred(values, kernel) for values in (compression, rim))
     outside = _blurred((~inside).astype(np.float64), kernel)
     continued = np.where(outside > 0.2, risen / np.maximum(outside, 0.2), risen)
-    to_end, _ = nearest((displayed <= MOVED) & (risen <= MOVED), far)
+    to_end = distance_to((displayed <= MOVED) & (risen <= MOVED), far)
     return displayed, risen, continued, np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0)
 
 
@@ -205,23 +206,46 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     >>> distance.round(3).tolist(), which[1].tolist()
     ([[0.0, 1.0, 2.0], [1.0, 1.414, 2.236]], [0, 0, 0])
     """
-    rows, columns = chosen.shape
+    high, source = _along_columns(chosen, far)
+    best = high.copy()
+    which = np.clip(source, 0, len(chosen) - 1) * chosen.shape[1] + np.arange(chosen.shape[1])
+    in_column = which.copy()
+    for shift, to, beside in _shifts(far, chosen.shape[1]):
+        distance = high[:, beside] + shift * shift
+        closer = distance < best[:, to]
+        np.copyto(best[:, to], distance, where=closer)
+        np.copyto(which[:, to], in_column[:, beside], where=closer)
+    return np.minimum(np.sqrt(best), float(far)), which
+
+
+def distance_to(chosen: Mask, far: int) -> Array:
+    """Distance to the nearest chosen cell's centre [cells], up to `far`: the first of `nearest`, in less time."""
+    high, _ = _along_columns(chosen, far)
+    best = high.copy()
+    for shift, to, beside in _shifts(far, chosen.shape[1]):
+        np.minimum(best[:, to], high[:, beside] + shift * shift, out=best[:, to])
+    return np.asarray(np.minimum(np.sqrt(best), float(far)))
+
+
+def _along_columns(chosen: Mask, far: int) -> tuple[NDArray[np.int32], Indices]:
+    """Squared distance to the nearest chosen cell of each cell's column, and its row."""
+    rows = len(chosen)
     row = np.arange(rows)[:, None]
     below = np.maximum.accumulate(np.where(chosen, row, -far - rows), axis=0)
     above = np.minimum.accumulate(np.where(chosen, row, 2 * rows + far)[::-1], axis=0)[::-1]
     source = np.where(row - below <= above - row, below, above)
-    high = np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2
-    best = high.copy()
-    which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
-    in_column = which.copy()
+    return np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2, source
+
+
+def _shifts(far: int, columns: int) -> Iterator[tuple[int, slice, slice]]:
+    """Columns, and those beside them to both sides, by how far these are."""
     for shift in range(1, min(far, columns - 1) + 1):
-        for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
-            distance = high[:, beside] + shift * shift
-            closer = distance < best[:, to]
-            np.copyto(best[:, to], distance, where=closer)
-            np.copyto(which[:, to], in_column[:, beside], where=closer)
-    return np.minimum(np.sqrt(best), float(far)), which
+        yield shift, slice(shift, None), slice(None, -shift)
+        yield shift, slice(None, -shift), slice(shift, None)
 
 
 def _blurred(values: Array, kernel: Array) -> Array:
-    return blurred_inside(np.pad(values, len(kernel) // 2, mode="edge"), kernel)
+    margin = len(kernel) // 2
+    for axis, size in enumerate(values.shape):  # its edges go on
+        values = values.take(np.arange(-margin, size + margin), axis=axis, mode="clip")
+    return blurred_inside(values, kernel)

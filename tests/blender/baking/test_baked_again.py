@@ -1,0 +1,147 @@
+"""A bake after a bake presses again what another setting, key or ground gives, and nothing else: never what was."""
+
+import bpy
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job, shot_prints
+from softground_addon.blender.compat import action_curves, slot_of
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.state import state
+from softground_addon.core.record.edits import StepEdit
+from tests.blender import fingerprints, shots
+from tests.blender.grounds import bake, plane
+
+
+def baked_walk(scene):
+    """A short walk on a plane, baked once, with all that is put on prints."""
+    shots.walker(scene, frames=36)
+    armature = bpy.context.view_layer.objects.active
+    scene.softground.ground = plane(scene, size=5.0, vertices=120)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    bake(scene, cell_size=0.02, relief="FINE", debris=True)
+
+
+@pytest.fixture
+def again(opened_as):
+    return opened_as(baked_walk)
+
+
+def raise_hips(scene, value):
+    armature = scene.softground.characters[0].armature
+    for curve in action_curves(armature.animation_data.action, slot_of(armature.animation_data)):
+        if curve.data_path.endswith("location"):
+            curve.keyframe_points[len(curve.keyframe_points) // 2].co.y += 0.002 * value
+            curve.update()
+
+
+def thicken_shoes(scene, value):
+    for figure in scene.softground.characters[0].armature.children:
+        for vertex in figure.data.vertices:
+            vertex.co.z -= 0.001 * value * (vertex.co.z < 0.05)
+
+
+def lift_ground(scene, value):
+    mesh = scene.softground.ground.data
+    bpy.ops.softground.clear_bake()
+    for vertex in mesh.vertices:
+        vertex.co.z += 0.0005 * value * (vertex.co.x > 0.0)
+
+
+CHANGES = {
+    "relief_strength": lambda scene, value: setattr(scene.softground, "relief_strength", 0.5 * value),
+    "relief": lambda scene, value: setattr(scene.softground, "relief", ("OFF", "FINE", "CLOSE_UP")[value % 3]),
+    "tread": lambda scene, value: setattr(scene.softground, "tread", 0.001 * value),
+    "shape_keys": lambda scene, value: setattr(scene.softground, "shape_keys", bool(value % 2)),
+    "debris": lambda scene, value: setattr(scene.softground, "debris", not value % 2),
+    "pressure": lambda scene, value: setattr(
+        scene.softground, "pressure", ("UNIFORM", "CENTRE_OF_PRESSURE")[value % 2]
+    ),
+    "preset": lambda scene, value: bpy.ops.softground.load_preset(name=("Snow", "Mud", "Dry Sand")[value % 3]),
+    "cell_size": lambda scene, value: setattr(scene.softground, "cell_size", 0.02 + 0.001 * value),
+    "mass": lambda scene, value: setattr(scene.softground.characters[0], "mass", 60.0 + value),
+    "frames": lambda scene, value: setattr(scene.softground, "frame_end", 36 - value),
+    "gravity": lambda scene, value: setattr(scene, "gravity", (0.0, 0.0, -9.81 + value)),
+    "sink_feet": lambda scene, value: setattr(scene.softground, "sink_feet", bool(value % 2)),
+    "tilt": lambda scene, value: setattr(scene.softground.tilt, "use", bool(value % 2)),
+    "keys": raise_hips,
+    "shoes": thicken_shoes,
+    "ground": lift_ground,
+    "nothing": lambda scene, value: None,
+}
+
+
+def left(scene):
+    """All that a bake leaves in the file, byte by byte, and its report, but for names and the time that it took."""
+    report = bake(scene).report
+    meshes = {mesh.name: fingerprints.of_mesh(mesh) for mesh in bpy.data.meshes}
+    for mesh in meshes.values():
+        mesh["properties"].pop(ground_mesh.SUMMARY, None)
+    tables = [[fingerprints.of_attribute(each) for each in curves.attributes] for curves in bpy.data.hair_curves]
+    actions = {action.name: fingerprints.of_action(action) for action in bpy.data.actions}
+    return meshes, tables, actions, {key: value for key, value in report.items() if key != "timings"}
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.lists(st.tuples(st.sampled_from(sorted(CHANGES)), st.integers(1, 4)), min_size=2, max_size=4))
+def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, changes):
+    scene = opened_as(baked_walk)
+    for name, value in changes:
+        CHANGES[name](scene, value)
+        as_it_comes = left(scene)
+        shot_prints.forget()
+        assert left(scene) == as_it_comes, name
+
+
+def presses(scene, change=lambda: None):
+    """True if a bake after a change presses prints."""
+    change()
+    before = state.prints
+    bake(scene)
+    return state.prints is not before
+
+
+def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again):
+    bake(again)
+    for name in ("relief_strength", "relief", "tread", "shape_keys"):
+        assert not presses(again, lambda name=name: CHANGES[name](again, 2)), name
+
+
+@pytest.mark.parametrize(
+    "name", ["debris", "pressure", "preset", "cell_size", "mass", "frames", "gravity", "keys", "shoes", "ground"]
+)
+def test_what_acts_on_prints_has_them_pressed_anew(again, name):
+    bake(again)
+    assert presses(again, lambda: CHANGES[name](again, 1))
+    assert not presses(again)
+
+
+def test_edits_of_steps_have_them_pressed_anew_and_come_with_the_bake(again):
+    step = bake(again).report["steps"][0]["id"]
+    ground = again.softground.ground
+    edited = {step: StepEdit(strength=0.5)}
+    whole = baked_ground.record_of(ground).edited[0]
+    jobs.run(bake_job.bake(again, edits=edited))
+    half = baked_ground.record_of(ground).edited[0]
+    assert half.compressed_m3 < 0.9 * whole.compressed_m3
+    assert not presses(again)
+    assert baked_ground.edits_of(ground) == edited
+    assert baked_ground.record_of(ground).edited[0].compressed_m3 == half.compressed_m3
+
+
+def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):
+    bake(again)
+    assert 0 < shot_prints._size(state.prints) < 50 * len(baked_ground.stored_record(again.softground.ground))
+    bpy.ops.softground.clear_bake()
+    assert state.prints is None
+    monkeypatch.setattr(shot_prints, "LARGEST", 1000)
+    bake(again)
+    assert state.prints is None
+    monkeypatch.undo()
+    bake(again)
+    assert state.prints is not None
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert state.prints is None
