@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,26 @@ class Regions:
         """Numbers of the kinds at world positions of any shape [m], `NOWHERE` beside the ground."""
         return np.nan_to_num(self.where.interpolated(x, y)[-1], nan=NOWHERE)
 
+    def near(self, low: Array, high: Array) -> list[int]:
+        """Numbers of the kinds, ascending, of which there is some near the box from low to high, (2,) each [m]."""
+        return np.unique(self.where.values[self.where.within(low, high), 0, -1]).astype(int).tolist()
+
+
+def numbered(
+    own: GroundKind, of_slots: Mapping[int, GroundKind | None]
+) -> tuple[tuple[GroundKind, ...], dict[int, float]]:
+    """Each kind of ground once, and its number for each slot that names one; `NOWHERE` of those that are hard.
+
+    Parameters
+    ----------
+    own : GroundKind
+        What the ground is made of where no slot says otherwise: the first kind.
+    of_slots : mapping of int to GroundKind or None
+        None of what is hard.
+    """
+    kinds = list(dict.fromkeys([own, *(kind for kind in of_slots.values() if kind)]))
+    return tuple(kinds), {slot: float(kinds.index(kind)) if kind else NOWHERE for slot, kind in of_slots.items()}
+
 
 class RegionTiles:
     """Kinds of ground at cell centres, looked up once per tile.
@@ -68,12 +88,16 @@ class RegionTiles:
     """
 
     def __init__(self, regions: Regions, cell_size: float) -> None:
+        self._regions = regions
         self._grid = SampledGrid(lambda x, y: regions.numbers(x, y)[None], cell_size, channels=1)
 
     def kinds(self, window: Window) -> list[int]:
         """Numbers of the kinds that have a share in cells of a window, ascending; the first where there is no ground."""
-        found = np.unique(self._grid.read(window.expanded(BORDER)))
-        return [int(number) for number in found if number != NOWHERE] or [0]
+        around = window.expanded(BORDER)
+        near = self._regions.near(*around.corners(self._grid.cell_size))
+        if len(near) > 1:
+            near = [int(number) for number in np.unique(self._grid.read(around)) if number != NOWHERE]
+        return near or [0]
 
     def shares(self, window: Window, kinds: Sequence[int]) -> Array:
         """Share that each of some kinds has in the cells of a window, (K, rows, columns), 1 in sum.
