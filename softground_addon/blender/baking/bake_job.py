@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks
+from ...core.carried.marks import Marks, sticks_most
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
@@ -122,12 +122,15 @@ def bake(
     inputs = wanted.inputs()
     if factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
-    input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
+    if surface and surface.kinds is not None:
+        inputs["regions_crc32"] = f"{zlib.crc32(surface.kinds.tobytes()):08x}"
+    painted = inputs.get("painted_crc32", "") + inputs.get("regions_crc32", "")
+    input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
     name = wanted.ground.name if wanted.ground else "the ground"
     checking = self_check.slices(pressed.loads, footprints, shot.terrain, wanted.cell_size_m, name)
     findings = [
         *(yield from meanwhile(Progress("simulate", 1.0), checking)),
-        *bottomed_out(footprints, wanted.material, name),
+        *_bottomed_out(wanted, footprints, name),
         *said,
         *edit_findings(left),
         *response_job.keyed_responses(wanted),
@@ -162,7 +165,7 @@ def bake(
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
         findings += of_ground
-        marks_object.put(published.ground, marks, surface=wanted.surface, units=wanted)
+        marks_object.put(published.ground, marks, surface=sticks_most(left.steps, wanted.surface), units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()
@@ -180,6 +183,16 @@ def bake(
         sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
+
+
+def _bottomed_out(wanted: BakeSettings, footprints: Sequence[Footprint], ground: str) -> list[Finding]:
+    """What to say of steps that end at the bottom of the deepest layer of their surface."""
+    by_depth = sorted(wanted.kinds[0], key=lambda kind: kind.material.deepest)
+    findings = []
+    for surface, material in {kind.surface: kind.material for kind in by_depth}.items():
+        steps = [step for step in footprints if (step.surface or wanted.surface) == surface]
+        findings += bottomed_out(steps, material, ground)
+    return findings
 
 
 def _left(

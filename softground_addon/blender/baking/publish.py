@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks, marks_of
+from ...core.carried.marks import Marks, marks_of, sticks_most
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
 from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
@@ -87,14 +87,15 @@ def marks_left(
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
         return None
-    density = surfaces.find(made_with.surface).density
+    surface = sticks_most(left.steps, made_with.surface)
+    density = surfaces.find(surface).density
     shed = shed_volumes(debris) if debris is not None else {}
     shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
     marking = marks_of.slices(
         loads,
         left.steps,
         terrain,
-        surface=made_with.surface,
+        surface=surface,
         shed={step: volume * density for step, volume in shed.items()},
         treads=dict.fromkeys(shod, made_with.tread_m),
     )

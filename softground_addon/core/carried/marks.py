@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -75,6 +76,12 @@ class _Contact:
     frames: Array
 
 
+def sticks_most(steps: Sequence[EditableStep], surface: str) -> str:
+    """The surface which sticks to soles that most steps are on, of those of regions; a ground's own without any."""
+    stepped = Counter(step.left.surface for step in steps if step.left and step.left.surface)
+    return next((one for one, _ in stepped.most_common() if surfaces.find(one).carried), surface)
+
+
 @sliced
 def marks_of(
     loads: Sequence[CharacterLoads],
@@ -94,6 +101,7 @@ def marks_of(
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     terrain : Terrain
     surface : str
+        From `sticks_most`: soles take up nothing else.
     shed : mapping of int to float, optional
         Mass that each step sheds in the air, by its number [kg].
     treads : mapping of (str, str) to float, optional
@@ -109,7 +117,8 @@ def marks_of(
             yield
             if motion.sole.prop is not None:
                 continue
-            soft = list(_soft_meetings(character, index, steps, shed))
+            sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
+            soft = list(_soft_meetings(character, index, sticky, shed))
             hard = character.contacts.hard
             if not soft or hard is None or not hard[:, index].any():
                 continue

@@ -125,7 +125,9 @@ class _Steps:
             self._of.setdefault((step.character, step.sole), []).append(row)
 
     def at(self, character: str, sole: str, first: float, last: float) -> tuple[str, float, float, str]:
-        """Id, depth [m], area [m²] and, of regions, surface of the print that a phase from one frame to another shares most time with."""
+        """Id, depth [m], area [m²] and, of regions, surface of the print that shares most time with a phase from one
+        frame to another.
+        """
         rows = self._of.get((character, sole), [])
         shared = [min(last, end) - max(first, start) for start, end, *_ in rows]
         if not shared or max(shared) < -1.0:

@@ -92,7 +92,7 @@ class RegionTiles:
         self._grid = SampledGrid(lambda x, y: regions.numbers(x, y)[None], cell_size, channels=1)
 
     def kinds(self, window: Window) -> list[int]:
-        """Numbers of the kinds that have a share in cells of a window, ascending; the first where there is no ground."""
+        """Numbers of the kinds that have a share in a window, ascending; the first where there is no ground."""
         around = window.expanded(BORDER)
         near = self._regions.near(*around.corners(self._grid.cell_size))
         if len(near) > 1:

@@ -121,7 +121,8 @@ class SoleLayout(ContactLayout):
                 np.where(pressing, self.force[steps], 0.0),
                 printing.sum(axis=1),
                 self._middle(poses, over_ground, printing),
-            ),            material,
+            ),
+            material,
             cells.made_of,
         )
 

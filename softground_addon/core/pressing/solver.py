@@ -233,9 +233,7 @@ class GroundSolver:
         inside = contact.surface.window.slices(window)
         return contact.surface.heights[inside], contact.surface.bears[inside]
 
-    def _slid(
-        self, state: Array, window: Window, terrain: Array, fixed: Mask, angle: float, sweeps: int
-    ) -> Array:
+    def _slid(self, state: Array, window: Window, terrain: Array, fixed: Mask, angle: float, sweeps: int) -> Array:
         """The rim of a window after what is too steep has slid down."""
         return slid(
             state[1],
