@@ -170,7 +170,8 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
-    debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
+    of_steps = {step.index: step.left.surface for step in left.steps if step.left and step.left.surface}
+    debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
     return Published(ground, shown, error)
 

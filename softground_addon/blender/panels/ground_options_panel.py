@@ -120,12 +120,10 @@ class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
-class SOFTGROUND_PT_regions(SidebarPanel, bpy.types.Panel):
+class SOFTGROUND_PT_regions(AdvancedPanel, bpy.types.Panel):
     """What the ground is made of in each of its materials"""
 
-    bl_label = "Materials"
-    bl_parent_id = "SOFTGROUND_PT_ground"
-    bl_options: Any = {"DEFAULT_CLOSED"}
+    bl_label = "Ground by Material"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

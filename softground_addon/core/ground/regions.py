@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .material import GroundMaterial
-from .sparse_grid import SampledGrid, Window
+from .sparse_grid import Window
 from .terrain import MeshTerrain
 
 Array = NDArray[np.float64]
@@ -56,9 +56,30 @@ class Regions:
         """Numbers of the kinds at world positions of any shape [m], `NOWHERE` beside the ground."""
         return np.nan_to_num(self.where.interpolated(x, y)[-1], nan=NOWHERE)
 
-    def near(self, low: Array, high: Array) -> list[int]:
-        """Numbers of the kinds, ascending, of which there is some near the box from low to high, (2,) each [m]."""
-        return np.unique(self.where.values[self.where.within(low, high), 0, -1]).astype(int).tolist()
+    def under(self, within: Window, window: Window, cell_size: float) -> tuple[list[int], Array | None]:
+        """Kinds of ground under a part of a window of cells, and the share of each in the cells of the window.
+
+        A share falls evenly from 1 to 0 across a border.
+
+        Returns
+        -------
+        kinds : list of K int
+            Ascending; the first of all where there is no ground.
+        shares : (K, rows, columns) float array or None
+            1 in sum; None of a single kind.
+        """
+        inner, around = within.expanded(BORDER), window.expanded(BORDER)
+        kinds = np.unique(self.where.values[self.where.within(*inner.corners(cell_size)), 0, -1])
+        if len(kinds) > 1:
+            numbers = self.numbers(*np.meshgrid(*around.centres(cell_size)))
+            kinds = np.unique(numbers[around.slices(inner)])
+            kinds = kinds[kinds != NOWHERE]
+        found = kinds.astype(int).tolist() or [0]
+        if len(found) == 1:
+            return found, None
+        shares = _sum_around(numbers == kinds[:, None, None])
+        total = shares.sum(axis=0)
+        return found, np.divide(shares, total, out=np.full(shares.shape, 1.0 / len(found)), where=total > 0)
 
 
 def numbered(
@@ -77,40 +98,7 @@ def numbered(
     return tuple(kinds), {slot: float(kinds.index(kind)) if kind else NOWHERE for slot, kind in of_slots.items()}
 
 
-class RegionTiles:
-    """Kinds of ground at cell centres, looked up once per tile.
-
-    Parameters
-    ----------
-    regions : Regions
-    cell_size : float
-        Side of a cell [m].
-    """
-
-    def __init__(self, regions: Regions, cell_size: float) -> None:
-        self._regions = regions
-        self._grid = SampledGrid(lambda x, y: regions.numbers(x, y)[None], cell_size, channels=1)
-
-    def kinds(self, window: Window) -> list[int]:
-        """Numbers of the kinds that have a share in a window, ascending; the first where there is no ground."""
-        around = window.expanded(BORDER)
-        near = self._regions.near(*around.corners(self._grid.cell_size))
-        if len(near) > 1:
-            near = [int(number) for number in np.unique(self._grid.read(around)) if number != NOWHERE]
-        return near or [0]
-
-    def shares(self, window: Window, kinds: Sequence[int]) -> Array:
-        """Share that each of some kinds has in the cells of a window, (K, rows, columns), 1 in sum.
-
-        It falls evenly from 1 to 0 across a border.
-        """
-        numbers = self._grid.read(window.expanded(BORDER))[0]
-        shares = _mean_around(numbers == np.array(kinds, float)[:, None, None])
-        total = shares.sum(axis=0)
-        return np.divide(shares, total, out=np.full(shares.shape, 1.0 / len(kinds)), where=total > 0)
-
-
-def _mean_around(values: NDArray[np.bool_]) -> Array:
+def _sum_around(values: NDArray[np.bool_]) -> Array:
     """Sum of values (K, rows + 2·BORDER, columns + 2·BORDER) over the cells around each of (K, rows, columns)."""
     width = 2 * BORDER + 1
     whole = np.pad(np.cumsum(np.cumsum(values, axis=1, dtype=np.float64), axis=2), ((0, 0), (1, 0), (1, 0)))

@@ -148,12 +148,15 @@ class MeshTerrain:
 
     def interpolated(self, x: Array, y: Array) -> Array:
         """The values of the highest upward-facing surface at each place, (C, ...); NaN where there is none."""
-        hits = self._surfaces(np.ravel(x), np.ravel(y))
-        order = np.argsort(hits.z, kind="stable")  # the highest is written last
-        a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
-        u, v = hits.u[order, None], hits.v[order, None]
+        across, along = np.ravel(x), np.ravel(y)
         values = np.full((np.size(x), self.values.shape[2]), np.nan)
-        values[hits.point[order]] = a + u * (b - a) + v * (c - a)
+        for first in range(0, len(values), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            order = np.argsort(hits.z, kind="stable")  # the highest is written last
+            a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
+            u, v = hits.u[order, None], hits.v[order, None]
+            values[part][hits.point[order]] = a + u * (b - a) + v * (c - a)
         return values.T.reshape(-1, *np.shape(x))
 
     def within(self, low: Array, high: Array) -> Indices:

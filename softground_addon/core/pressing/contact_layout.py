@@ -83,15 +83,15 @@ class ContactLayout(ABC):
         while last > end and (window.cells > allowed or window.cells * (last - start) > most):
             last = end + (last - end) // (2 * per_frame) * per_frame
             window = self._window(start, last, widest)
-        regions = cells.undisturbed.regions
-        numbers = regions.kinds(window.expanded(-whole_reach(widest.rim_reach))) if regions else [0]
+        numbers, shares = [0], None
+        if regions := cells.ground.regions:
+            sole = window.expanded(-whole_reach(widest.rim_reach))
+            numbers, shares = regions.under(sole, window, cells.cell_size)
         kinds = [cells.kinds[number] for number in numbers]
         if len(kinds) == 1 and kinds[0] is not widest:
             window = self._window(start, last, kinds[0])
         of_kinds = [self._deeper(self._lay_out(start, last, window, c, timing.step, sinkage), c) for c in kinds]
-        if regions is None or len(kinds) == 1:
-            return of_kinds[0]
-        return self._across(of_kinds, regions.shares(window, numbers), kinds)
+        return of_kinds[0] if shares is None else self._across(of_kinds, shares, kinds)
 
     def _across(self, of_kinds: Sequence[Imprints], shares: Array, kinds: Sequence[GroundCells]) -> Imprints:
         """The imprints across borders between kinds of ground, whose shares in each cell are (K, rows, columns)."""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import bare
 from ..ground.heightfield import Surface, TerrainTiles
 from ..ground.material import GroundMaterial
-from ..ground.regions import RegionTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, VariationTiles
@@ -39,18 +38,13 @@ class Timing:
 
 
 class UndisturbedCells:
-    """The undisturbed ground in cells: its surface, how it varies, and its regions; looked up once per tile.
+    """The undisturbed ground in cells: its surface, and how it varies; looked up once per tile.
 
     Parameters
     ----------
     ground : SoftGround
     cell_size : float
         Side of a cell [m].
-
-    Attributes
-    ----------
-    regions : RegionTiles or None
-        None where the ground is all of one kind.
     """
 
     def __init__(self, ground: SoftGround, cell_size: float) -> None:
@@ -58,7 +52,6 @@ class UndisturbedCells:
         self._terrain = bare(ground.terrain)
         self._tiles: dict[int, TerrainTiles] = {}
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
-        self.regions = RegionTiles(ground.regions, cell_size) if ground.regions else None
 
     def surface(self, window: Window, divisions: int = 1) -> Surface:
         """The ground under a window, its cells divided in so many parts along each side."""

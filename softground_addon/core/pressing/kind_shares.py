@@ -43,7 +43,7 @@ def across(of_kinds: Sequence[Imprints], shares: Array, most: int) -> Imprints:
     of_kinds : sequence of K Imprints
         The same steps over the same window, as if all of the ground were of each kind.
     shares : (K, rows, columns) float array
-        From `RegionTiles.shares`.
+        From `Regions.under`.
     most : int
         The kind that bears most, whose coverage, rim and loads stand for all.
     """

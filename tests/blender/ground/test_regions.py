@@ -8,6 +8,8 @@ import pytest
 
 from softground_addon.blender import ground_slots, settings
 from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender.carried import marks_object
+from softground_addon.blender.debris import debris_nodes, debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.materials.materials import MARK, OVER
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
@@ -112,9 +114,7 @@ def test_a_bake_is_outdated_by_a_preset_or_a_face_that_is_of_another_material(fo
     bake(four)
     assert bake_report.stale_reasons(four) == ()
     four.softground.ground.data.polygons[-1].material_index = 3
-    assert bake_report.stale_reasons(four) == (
-        "The modifiers of 'Field', or what is painted on it, have changed",
-    )
+    assert bake_report.stale_reasons(four) == ("The modifiers of 'Field', or what is painted on it, have changed",)
 
 
 def test_a_face_attribute_counts_in_place_of_the_materials(four):
@@ -212,3 +212,40 @@ def test_what_the_record_says_is_read_back(four):
     made_with = step_edits.editable(four).made_with
     choose()
     assert made_with.regions == settings.snapshot(four).regions
+
+
+def test_crumbs_look_like_the_material_that_they_come_from(four):
+    choose()
+    four.softground.debris = True
+    bake(four)
+    debris = debris_object.of(four.softground.ground)
+    looks = np.empty(len(debris.data.vertices), np.int32)
+    debris.data.attributes[debris_nodes.LOOK].data.foreach_get("value", looks)
+    steps = baked_ground.record_of(four.softground.ground).steps
+    number = np.empty(len(looks), np.int32)
+    debris.data.attributes["step"].data.foreach_get("value", number)
+    order = ["snow", *dict.fromkeys(step.left.surface for step in steps if step.left.surface != "snow")]
+    assert [order[look] for look in looks] == [steps[n].left.surface for n in number]
+    four.frame_set(four.softground.frame_end + 60)
+    shown = debris.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    pieces = {
+        instance.object.data.name.removeprefix("SoftGround ").partition(" Pieces")[0]
+        for instance in bpy.context.evaluated_depsgraph_get().object_instances
+        if instance.is_instance and instance.parent == shown
+    }
+    assert pieces >= {"Snow", "Mud"}
+    choose(("", "", "", ""))
+    bake(four)
+    assert debris_nodes.LOOK not in debris_object.of(four.softground.ground).data.attributes
+    assert sum(bool(block.get(debris_nodes.MARK)) for block in bpy.data.collections) == 1
+
+
+def test_soles_carry_what_sticks_onto_a_hard_material(four):
+    choose()
+    four.softground.marks = True
+    assert bake(four).report["totals"]["carried_kg"]["picked_up"] > 0
+    marks = marks_object.of(four.softground.ground)
+    bpy.context.view_layer.update()
+    y = [(marks.matrix_world @ vertex.co).y for vertex in marks.data.vertices]
+    assert y
+    assert max(y) < BORDERS[2] + 0.01
