@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks, sticks_most
+from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.composers.ground_plan import GroundPlan
@@ -165,7 +165,7 @@ def bake(
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
         findings += of_ground
-        marks_object.put(published.ground, marks, surface=sticks_most(left.steps, wanted.surface), units=wanted)
+        marks_object.put(published.ground, marks, surface=marks.surface if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks, marks_of, sticks_most
+from ...core.carried.marks import Marks, marks_of
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
 from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
@@ -84,22 +84,27 @@ def marks_left(
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
 ) -> Slices[Marks | None]:
-    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
+    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`. Of several grounds that stick, those
+    of the one that leaves most.
+    """
     if not made_with.marks:
         return None
-    surface = sticks_most(left.steps, made_with.surface)
-    density = surfaces.find(surface).density
     shed = shed_volumes(debris) if debris is not None else {}
     shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
-    marking = marks_of.slices(
-        loads,
-        left.steps,
-        terrain,
-        surface=surface,
-        shed={step: volume * density for step, volume in shed.items()},
-        treads=dict.fromkeys(shod, made_with.tread_m),
-    )
-    return (yield from marking)
+    most: Marks | None = None
+    for surface in dict.fromkeys([made_with.surface, *(step.surface for step in left.footprints if step.surface)]):
+        density = surfaces.find(surface).density
+        marks = yield from marks_of.slices(
+            loads,
+            left.steps,
+            terrain,
+            surface=surface,
+            shed={step: volume * density for step, volume in shed.items()},
+            treads=dict.fromkeys(shod, made_with.tread_m),
+        )
+        if most is None or (marks and marks.carried.left_behind > most.carried.left_behind):
+            most = marks
+    return most
 
 
 def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:

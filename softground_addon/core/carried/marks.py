@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -53,6 +52,8 @@ class Marks:
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
     carried : CarriedMass
+    surface : str
+        What they are of.
     """
 
     position: Array
@@ -64,6 +65,7 @@ class Marks:
     tread: Array
     step: NDArray[np.intp]
     carried: CarriedMass = field(default_factory=CarriedMass)
+    surface: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,12 +76,6 @@ class _Contact:
     laid: HardPrint
     shares: Array
     frames: Array
-
-
-def sticks_most(steps: Sequence[EditableStep], surface: str) -> str:
-    """The surface which sticks to soles that most steps are on, of those of regions; a ground's own without any."""
-    stepped = Counter(step.left.surface for step in steps if step.left and step.left.surface)
-    return next((one for one, _ in stepped.most_common() if surfaces.find(one).carried), surface)
 
 
 @sliced
@@ -101,7 +97,7 @@ def marks_of(
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     terrain : Terrain
     surface : str
-        From `sticks_most`: soles take up nothing else.
+        What soles take up, of all that the ground is made of.
     shed : mapping of int to float, optional
         Mass that each step sheds in the air, by its number [kg].
     treads : mapping of (str, str) to float, optional
@@ -137,7 +133,7 @@ def marks_of(
                     depth = treads.get((character.motion.name, motion.sole.name), 0.0)
                     parts.append(_mark(grid, contact, film, count, depth))
                     count += 1
-    return _joined(parts, booked)
+    return replace(_joined(parts, booked), surface=surface)
 
 
 def _soft_meetings(
