@@ -66,7 +66,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     ground.data.polygons.foreach_set("material_index", slots.ravel())
     ground.data.update()
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.25, 3.1, 1.7), (-0.12, -1.2, 0.2), 30.0, (0.0, -0.6, 0.0), 11.0)
+    open_air.add_camera(scene, (1.0, 2.75, 1.5), (-0.2, -0.95, 0.12), 29.0, (0.0, -0.3, 0.0), 11.0)
     chosen = {"relief_vertices": "400000"} | dict(options or {})
     return FourInOneWalk({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 
@@ -97,7 +97,7 @@ def shoot(_built: FourInOneWalk, folder: Path, samples: int) -> list[Path]:
     """All four from behind, under a low sun from the side."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-155), radians(17), (1.0, 0.90, 0.78), 4.2, 0.4, open_air.PALE_DUSK)
-    scene.view_settings.exposure = 0.5
+    scene.view_settings.exposure = 0.4
     scene.frame_set(SHOWN)
     outfit.wear_boots(bpy.data.objects["Hiker"], Body())
     path = folder / "four_in_one_walk.jpg"
@@ -114,7 +114,7 @@ def _rock() -> bpy.types.Material:
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
     grain = graph.ramp(graph.noise(place, 0.03, 7.0, 0.75), 0.2, 0.8, 0.6, 1.3)
     patches = graph.ramp(graph.noise(place, 0.7, 4.0, 0.6), 0.3, 0.7, 0.75, 1.15)
-    base = graph.node("ShaderNodeVectorMath", {0: (0.40, 0.34, 0.28), "Scale": grain * patches}, operation="SCALE")
+    base = graph.node("ShaderNodeVectorMath", {0: (0.27, 0.23, 0.19), "Scale": grain * patches}, operation="SCALE")
     steps = graph.ramp(graph.noise(place, 0.6, 6.0, 0.55), 0.42, 0.58)
     uneven = steps * 0.03 + graph.noise(place, 0.02, 5.0, 0.7) * 0.004
     relief = graph.node("ShaderNodeDisplacement", {"Height": uneven, "Midlevel": 0.0, "Scale": 1.0})

@@ -16,10 +16,8 @@ from ..core.ground import presets
 from ..core.settings import RegionSettings
 from .state import state
 
-PRESET = "softground_preset"
-"""Property of a material: file name of the preset of the ground that it is on, `HARD`, or nothing."""
 HARD = "none"
-"""In place of a preset: a floor that bears and does not give way."""
+"""In `Material.softground_preset`, in place of the file name of a preset: a floor that bears and does not give way."""
 ATTRIBUTE = "softground_region"
 """Integer attribute on faces: number of the slot whose preset counts instead of the face's own; less than 0 is none."""
 OVER = "softground_over"
@@ -120,7 +118,8 @@ def _region(number: int, name: str, length_scale: float) -> RegionSettings:
 
 def check(ground: bpy.types.Object) -> None:
     """Raise InputError if a slot of a ground names a preset that cannot be read, or the attribute is none of faces."""
-    for _, material, name in naming(ground):
+    slots = list(naming(ground))
+    for _, material, name in slots:
         if name != HARD:
             try:
                 named(name)
@@ -128,7 +127,7 @@ def check(ground: bpy.types.Object) -> None:
                 raise InputError(f"Material '{material.name}' of ground '{ground.name}': {error}") from None
     mesh: Any = ground.data
     attribute = mesh.attributes.get(ATTRIBUTE)
-    if attribute and (attribute.domain, attribute.data_type) != ("FACE", "INT"):
+    if slots and attribute and (attribute.domain, attribute.data_type) != ("FACE", "INT"):
         raise InputError(
             f"Attribute '{ATTRIBUTE}' of ground '{ground.name}' is not an integer on faces: convert it in Object Data "
             "Properties > Attributes (domain Face, type Integer)."

@@ -181,8 +181,8 @@ def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset
 def test_a_preset_that_is_gone_is_named_with_its_material_and_nothing_changes(four):
     choose(("", "custard"))
     assert "Material 'Yellow' of ground 'Field': There is no preset 'custard'" in refusal(bpy.ops.softground.bake)
-    choose(("", ""))
     four.softground.ground.data.attributes.new(ground_slots.ATTRIBUTE, "FLOAT", "POINT")
+    choose(("", "mud"))
     assert "is not an integer on faces" in refusal(bpy.ops.softground.bake)
 
 

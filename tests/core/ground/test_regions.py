@@ -18,6 +18,7 @@ from softground_addon.core.ground.regions import NOWHERE, GroundKind, Regions, n
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.ground.terrain import MeshTerrain
+from softground_addon.core.ground.variation import PaintedSurface
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import QUANTUM, recompose
@@ -130,6 +131,27 @@ def test_beside_the_ground_there_is_no_other_kind():
     _, shares = ground.regions.under(window, window, 0.1)
     assert shares[1, :3] == pytest.approx(np.tile([0, 1 / 3, 2 / 3, 1], (3, 1)))
     assert shares[:, 3:] == pytest.approx(0.5)
+
+
+def test_masks_work_on_every_kind():
+    ground = stripes([0.0], (GroundKind("mud", MUD), GroundKind("snow", SNOW)))
+    factors = np.tile([0.5, 1.0, 0.5], (6, 1))
+    x = np.array([-20.0, 0.0, 20.0])
+    vertices = np.array([(across, along, 0.0) for across in x for along in (-20.0, 20.0)])
+    terrain = MeshTerrain.from_mesh(
+        vertices,
+        np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]]),
+        values=factors,
+        of_faces=np.array([0, 0, 1, 1]),
+    )
+    painted = replace(
+        ground, terrain=terrain, variation=PaintedSurface(terrain), regions=Regions(ground.regions.kinds, terrain)
+    )
+    for place, material in ((-0.5, MUD), (0.5, SNOW)):
+        loads = standing(box_sole(0.24, 0.08), [[place, 0, 0]], 300.0)
+        (plain,), (softer,) = pressed(loads, ground)[1], pressed(loads, painted)[1]
+        assert softer.max_depth_m == pytest.approx(2 * plain.max_depth_m, rel=1e-6)
+        assert softer.rim_m3 == pytest.approx(material.poisson_ratio * softer.compressed_m3, rel=1e-9)
 
 
 def rut_depth(ground, x):
