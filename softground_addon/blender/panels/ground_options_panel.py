@@ -8,7 +8,7 @@ import bpy
 
 from ...core.composers.relief_plan import IMAGE
 from ...core.loads.cell_limits import Coverage, Fineness, duration
-from .. import settings
+from .. import ground_slots, settings
 from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import painted_ground
@@ -121,6 +121,27 @@ class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
+class SOFTGROUND_PT_regions(AdvancedPanel, bpy.types.Panel):
+    """What the ground is made of in each of its materials"""
+
+    bl_label = "Ground by Material"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        ground = settings.options_of(context).ground
+        return ground is not None and (len(ground.material_slots) > 1 or any(ground_slots.naming(ground)))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.fields().column(align=True)
+        for number, slot in enumerate(settings.options_of(context).ground.material_slots):
+            material = ground_slots.theirs(slot.material)
+            row = column.split(factor=0.45, align=True)
+            row.label(text=material.name if material else "", icon="MATERIAL", translate=False)
+            title = ground_slots.title_of(material)
+            row.alert = title.startswith("?")
+            row.operator_menu_enum("softground.region_preset", "preset", text=title).slot = number
+
+
 class SOFTGROUND_UL_hard_grounds(Listed):
     """Hard objects by name."""
 
@@ -214,6 +235,7 @@ CLASSES = (
     SOFTGROUND_PT_prints,
     SOFTGROUND_PT_material,
     SOFTGROUND_PT_layers,
+    SOFTGROUND_PT_regions,
     SOFTGROUND_PT_painted,
     SOFTGROUND_UL_hard_grounds,
     SOFTGROUND_PT_hard_ground,

@@ -39,6 +39,7 @@ PAGES = (
     ("bpy.ops.softground.import_capture", "forces.html#your-own-captures"),
     ("bpy.ops.softground.export", "playback.html#other-programs"),
     ("bpy.ops.softground.final_mesh", "playback.html#other-programs"),
+    ("bpy.ops.softground.region_preset", "ground.html#several-grounds-on-one-mesh"),
     ("bpy.ops.softground.*preset", "ground.html"),
     ("bpy.types.softgroundmaterial.*", "ground_law.html#fields"),
     ("bpy.types.softgroundpainted.*", "ground.html#masks"),

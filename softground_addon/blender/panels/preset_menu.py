@@ -15,24 +15,12 @@ from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, jobs, settings
 from ..characters.character_setup import characters_of, title_of
-from ..ground_presets import user_folder
+from ..ground_slots import listed, loaded, user_folder
 from ..operator_base import OnShot, reports_errors
 from ..operators.modal_job import ReadingShot, Reports
 from ..reading import analysis
-from ..state import state
 from ..translation import CONTEXT, translated
 from . import preset_icons
-
-
-def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
-    """The presets of a folder by name, and what is wrong with the files that are none."""
-    loaded, broken = [], []
-    for path in sorted(folder.glob("*.json")):
-        try:
-            loaded.append((path, _loaded(path)))
-        except InputError as error:
-            broken.append(str(error))
-    return sorted(loaded, key=lambda entry: entry[1].name.casefold()), broken
 
 
 def title_of_ground(options: Any) -> str:
@@ -53,17 +41,9 @@ def _presets_of(name: str) -> Iterator[tuple[Path, presets.Preset]]:
     """The preset of that name with its file: that which comes with the add-on, and the user's."""
     for path in (presets.FOLDER / _file_name(name), _file_for(name)):
         with suppress(OSError, InputError):
-            preset = _loaded(path)
+            preset = loaded(path)
             if preset.name == name:
                 yield path, preset
-
-
-def _loaded(path: Path) -> presets.Preset:
-    """The preset in a file, read again only where it was written since."""
-    written = path.stat().st_mtime_ns
-    if path not in state.presets or state.presets[path][0] != written:
-        state.presets[path] = written, presets.load(path)
-    return state.presets[path][1]
 
 
 class SOFTGROUND_MT_presets(bpy.types.Menu):

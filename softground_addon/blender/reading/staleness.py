@@ -14,7 +14,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.settings import Acts, BakeSettings, CharacterSettings
-from .. import settings
+from .. import ground_slots, settings
 from ..compat import SERIES
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..ground.baked_ground import display_mesh_of
@@ -200,7 +200,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole = {"marks": True, "carve": False, "hard_grounds": (), **inputs}
+    whole = {"marks": True, "carve": False, "hard_grounds": (), "regions": (), **inputs}
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
@@ -251,6 +251,8 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
     except InputError as error:
         return str(error)
     parts += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in names]
+    if any(ground_slots.naming(ground)):
+        parts += [f"{zlib.crc32(ground_slots.of_faces(ground_mesh.mesh_of(ground)).data):08x}"]
     return input_hashes.joined([*parts, input_hashes.of_weights(ground, names)])
 
 

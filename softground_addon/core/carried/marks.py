@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -52,6 +52,8 @@ class Marks:
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
     carried : CarriedMass
+    surface : str
+        What they are of.
     """
 
     position: Array
@@ -63,6 +65,7 @@ class Marks:
     tread: Array
     step: NDArray[np.intp]
     carried: CarriedMass = field(default_factory=CarriedMass)
+    surface: str = ""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ def marks_of(
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     terrain : Terrain
     surface : str
+        What soles take up, of all that the ground is made of.
     shed : mapping of int to float, optional
         Mass that each step sheds in the air, by its number [kg].
     treads : mapping of (str, str) to float, optional
@@ -109,7 +113,8 @@ def marks_of(
             yield
             if motion.sole.prop is not None:
                 continue
-            soft = list(_soft_meetings(character, index, steps, shed))
+            sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
+            soft = list(_soft_meetings(character, index, sticky, shed))
             hard = character.contacts.hard
             if not soft or hard is None or not hard[:, index].any():
                 continue
@@ -128,7 +133,7 @@ def marks_of(
                     depth = treads.get((character.motion.name, motion.sole.name), 0.0)
                     parts.append(_mark(grid, contact, film, count, depth))
                     count += 1
-    return _joined(parts, booked)
+    return replace(_joined(parts, booked), surface=surface)
 
 
 def _soft_meetings(

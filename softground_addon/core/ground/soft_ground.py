@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .heightfield import HeightField, Terrain
 from .material import STANDARD_GRAVITY, GroundMaterial, Pressure
+from .regions import Regions
 from .sparse_grid import SparseGrid, Window
 from .variation import Variation
 
@@ -80,6 +81,8 @@ class SoftGround:
         What steps find of earlier ones; None where these stay as they are.
     gravity : float
         [m/s²].
+    regions : Regions or None
+        Where it is made of something else than `material`; None where it is all the same.
     """
 
     terrain: Terrain
@@ -88,3 +91,14 @@ class SoftGround:
     variation: Variation | None = None
     weathering: Weathering | None = None
     gravity: float = STANDARD_GRAVITY
+    regions: Regions | None = None
+
+    @property
+    def materials(self) -> tuple[GroundMaterial, ...]:
+        """All that it is made of somewhere."""
+        return tuple(kind.material for kind in self.regions.kinds) if self.regions else (self.material,)
+
+    @property
+    def slides(self) -> bool:
+        """True if it has an angle of repose somewhere."""
+        return any(material.repose_angle for material in self.materials)

@@ -1,0 +1,65 @@
+"""A contact across borders of the ground: each cell takes its share of what each kind of ground alone would do.
+
+The law of no kind is asked about what is none of its own: a cell in the middle of a region is pressed as if the whole
+ground were like it, and between two regions the compression goes over from the one's to the other's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.variation import Factors
+from .ground_cells import Imprints
+
+Array = NDArray[np.float64]
+
+INCOMPRESSIBLE = 0.5
+"""Poisson's ratio of ground all of which rises that is compressed; in each cell a factor takes off what does not."""
+
+
+def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
+    """Sum of the values of each kind, (N,) or (N, rows, columns), times their shares (K, rows, columns)."""
+    total = np.zeros(1)
+    for value, share in zip(values, shares, strict=True):
+        total = total + share * (value if value.ndim > 1 else value[:, None, None])
+    return total
+
+
+def bears_most(of_kinds: Sequence[Imprints], shares: Array) -> int:
+    """Which of the kinds has most of the area of contact in its cells."""
+    areas = [float((share * each.coverage).sum()) for each, share in zip(of_kinds, shares, strict=True)]
+    return int(np.argmax(areas))
+
+
+def across(of_kinds: Sequence[Imprints], shares: Array, most: int) -> Imprints:
+    """How much which cells are compressed where each kind of ground has a share in them.
+
+    Parameters
+    ----------
+    of_kinds : sequence of K Imprints
+        The same steps over the same window, as if all of the ground were of each kind.
+    shares : (K, rows, columns) float array
+        From `Regions.under`.
+    most : int
+        The kind that bears most, whose coverage, rim and loads stand for all.
+    """
+    laid = of_kinds[most]
+    raised = sum(share * 2.0 * each.material.poisson_ratio for each, share in zip(of_kinds, shares, strict=True))
+    even = laid.factors or Factors(*np.ones((3, *shares.shape[1:])))
+    holds = None
+    if any(each.holds is not None for each in of_kinds):
+        held = [np.zeros(1) if each.holds is None else each.holds.astype(float) for each in of_kinds]
+        holds = in_shares(held, shares) > 0.5
+    return replace(
+        laid,
+        pressing=np.any([each.pressing for each in of_kinds], axis=0),
+        target=in_shares([each.target for each in of_kinds], shares),
+        rate=in_shares([each.rate for each in of_kinds], shares),
+        holds=holds,
+        factors=Factors(even.stiffness, even.depth, np.asarray(even.rim * raised)),
+        material=replace(laid.material, poisson_ratio=INCOMPRESSIBLE),
+    )
