@@ -234,6 +234,7 @@ def character_of(character: Any) -> CharacterSettings:
             for hold in character.holds
         ),
         body=name_of(character.body) if character.body and not armature else None,
+        dirty_soles=character.dirty_soles,
     )
 
 

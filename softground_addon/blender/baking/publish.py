@@ -91,6 +91,7 @@ def marks_left(
         return None
     shed = shed_volumes(debris) if debris is not None else {}
     shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
+    dirty = {character.name: character.dirty_soles for character in made_with.characters}
     most: Marks | None = None
     for surface in dict.fromkeys([made_with.surface, *(step.surface for step in left.footprints if step.surface)]):
         density = surfaces.find(surface).density
@@ -101,6 +102,7 @@ def marks_left(
             surface=surface,
             shed={step: volume * density for step, volume in shed.items()},
             treads=dict.fromkeys(shod, made_with.tread_m),
+            brought=dirty if surface == made_with.surface else {},
         )
         if most is None or (marks and marks.carried.left_behind > most.carried.left_behind):
             most = marks

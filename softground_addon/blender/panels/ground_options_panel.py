@@ -59,6 +59,8 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         if options.debris and options.ground is not None:
             _wind(column, options.ground)
         column.prop(options, "marks")
+        if options.marks and (character := active_character(options)):
+            column.prop(character, "dirty_soles")
         if options.marks and options.ground is not None and (marks := marks_object.of(options.ground)):
             for name, field in marks_object.fields_of(marks):
                 column.prop(*field, text=name)

@@ -139,6 +139,10 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         soft_max=500.0,
         precision=1,
     )
+    dirty_soles: share(
+        "Dirty Soles",
+        "How much of the ground's snow, mud or wet sand is on its soles as the shot starts: 1 is all that they carry",
+    )
     size: FloatProperty(
         name="Size", description="Size of the rig, which shows whether its scale is wrong", options={"HIDDEN"}
     )

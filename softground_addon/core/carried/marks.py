@@ -87,6 +87,7 @@ def marks_of(
     surface: str,
     shed: Mapping[int, float] = MappingProxyType({}),
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
+    brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or the ground does not stick.
 
@@ -102,6 +103,8 @@ def marks_of(
         Mass that each step sheds in the air, by its number [kg].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
+    brought : mapping of str to float, optional
+        Film on the soles of a character as the shot starts, over the thickest, by its name.
     """
     carried = surfaces.find(surface).carried
     if carried is None or not isinstance(terrain, HardOnSoft):
@@ -116,7 +119,8 @@ def marks_of(
             sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
             soft = list(_soft_meetings(character, index, sticky, shed))
             hard = character.contacts.hard
-            if not soft or hard is None or not hard[:, index].any():
+            dirty = brought.get(character.motion.name, 0.0)
+            if not (soft or dirty) or hard is None or not hard[:, index].any():
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
@@ -124,7 +128,7 @@ def marks_of(
                 contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
                 yield
             meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
-            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area))
+            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
             booked += of_sole
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
             for contact in contacts:
