@@ -15,7 +15,7 @@ from softground_addon.blender.materials.materials import MARK, OVER
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
-from tests.blender import shots
+from tests.blender import command_line, shots
 from tests.blender.grounds import bake, plane, refusal
 
 BORDERS = (-0.9, -1.9, -2.9)
@@ -186,6 +186,11 @@ def test_a_preset_that_is_gone_is_named_with_its_material_and_nothing_changes(fo
     assert "is not an integer on faces" in refusal(bpy.ops.softground.bake)
 
 
+def test_a_ground_that_is_hard_wherever_somebody_walks_is_refused(four):
+    choose((ground_slots.HARD,) * 4)
+    assert "'Field' is nothing but hard floor under the character's path" in refusal(bpy.ops.softground.bake)
+
+
 def test_a_slot_without_a_material_of_one_s_own_is_refused(four):
     ground = four.softground.ground
     ground.material_slots[1].material = None
@@ -249,3 +254,26 @@ def test_soles_carry_what_sticks_onto_a_hard_material(four):
     y = [(marks.matrix_world @ vertex.co).y for vertex in marks.data.vertices]
     assert y
     assert max(y) < BORDERS[2] + 0.01
+
+
+def test_the_command_line_bakes_what_the_file_says(four, tmp_path):
+    choose()
+    expected = [(row["id"], row["surface"], row["compressed_m3"]) for row in bake(four).report["steps"]]
+    bpy.ops.softground.clear_bake()
+    shot, report = tmp_path / "four.blend", tmp_path / "report.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    done = command_line.run("bake", shot, "--dry-run", "--report", report)
+    assert done.returncode == 0, done.stderr
+    steps = json.loads(report.read_text())["steps"]
+    assert [(row["id"], row["surface"], row["compressed_m3"]) for row in steps] == expected
+
+
+def test_live_footprints_are_those_of_the_bake(four):
+    choose()
+    four.frame_set(four.softground.frame_start)
+    bpy.ops.softground.live()
+    four.frame_set(four.softground.frame_end)
+    bpy.ops.softground.live(keep=True)
+    kept = baked_ground.record_of(four.softground.ground).footprints
+    bpy.ops.softground.clear_bake()
+    assert bytes_of(kept) == bytes_of(bake(four).footprints)
