@@ -69,10 +69,19 @@ class GroundSurface:
 def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
     """A ground's surface where it is not hard as a function of place, within bounds in the plane [m]."""
     triangles, kinds, name = surface.triangles, surface.kinds, f"Ground '{surface.name}'"
-    if kinds is not None and not (soft := kinds != NOWHERE).all():
-        triangles, kinds, name = triangles[soft], kinds[soft], f"{name}, but for what is hard,"
+    is_soft = np.True_ if kinds is None else kinds != NOWHERE
+    if kinds is not None and not is_soft.all():
+        triangles, kinds = triangles[is_soft], kinds[is_soft]
     mesh = surface.surface_vertices, triangles, bounds, surface.factors
-    return (yield from MeshTerrain.from_mesh.slices(*mesh, of_faces=kinds, name=name))
+    try:
+        return (yield from MeshTerrain.from_mesh.slices(*mesh, of_faces=kinds, name=name))
+    except InputError:
+        if is_soft.all():
+            raise
+    raise InputError(
+        f"{name} is nothing but hard floor under the character's path: choose a preset for a material there, in "
+        "Advanced > Ground by Material."
+    )
 
 
 @sliced

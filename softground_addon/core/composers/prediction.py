@@ -99,8 +99,8 @@ class ShotContacts:
 
 @sliced
 def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Slices[ShotContacts]:
-    """Every contact of the characters, pressed as if the ground had no regions; each character
-    treads on its own prints only, and no weather on them.
+    """Every contact of the characters, pressed as if the ground had no regions; each character treads on its own prints
+    only, and no weather on them.
 
     Parameters
     ----------

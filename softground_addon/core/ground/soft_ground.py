@@ -94,11 +94,13 @@ class SoftGround:
     regions: Regions | None = None
 
     @property
-    def materials(self) -> tuple[GroundMaterial, ...]:
-        """All that it is made of somewhere."""
-        return tuple(kind.material for kind in self.regions.kinds) if self.regions else (self.material,)
-
-    @property
     def slides(self) -> bool:
         """True if it has an angle of repose somewhere."""
-        return any(material.repose_angle for material in self.materials)
+        kinds = self.regions.kinds if self.regions else ()
+        return any(material.repose_angle for material in (self.material, *(kind.material for kind in kinds)))
+
+    def materials_under(self, window: Window, cell_size: float) -> list[GroundMaterial]:
+        """What it is made of under a window of cells of that side [m]."""
+        if self.regions is None:
+            return [self.material]
+        return [self.regions.kinds[number].material for number in self.regions.under(window, window, cell_size)[0]]

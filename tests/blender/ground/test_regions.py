@@ -1,6 +1,8 @@
 """One ground of several materials, each of which names a preset: snow, sand, mud, and a hard floor."""
 
 import json
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -13,9 +15,11 @@ from softground_addon.blender.debris import debris_nodes, debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.materials.materials import MARK, OVER
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
+from softground_addon.core.ground import presets
+from softground_addon.core.ground.regions import MOST
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
-from tests.blender import shots
+from tests.blender import command_line, shots
 from tests.blender.grounds import bake, plane, refusal
 
 BORDERS = (-0.9, -1.9, -2.9)
@@ -178,12 +182,54 @@ def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset
     assert ground.material_slots[0].material.softground_preset == ""
 
 
+def test_the_panel_has_a_menu_for_each_material_with_its_preset(four):
+    choose(("", "dry_sand", "none", "custard"))
+    layout = MagicMock()
+    layout.column.return_value = layout.split.return_value = layout
+    SOFTGROUND_PT_regions.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
+    labels = [call.kwargs["text"] for call in layout.label.call_args_list]
+    menus = [call.kwargs["text"] for call in layout.operator_menu_enum.call_args_list]
+    assert labels == ["White", "Yellow", "Brown", "Grey"]
+    assert menus == ["As the Ground", "Dry Sand", "Hard Floor", "? custard"]
+
+
+def test_more_presets_than_the_solver_takes_are_refused(four):
+    names = sorted(path.stem for path in presets.FOLDER.glob("*.json") if path.stem != "snow")[:MOST]
+    data = four.softground.ground.data
+    for name in names[len(data.materials) :]:
+        data.materials.append(bpy.data.materials.new(name))
+    choose(names)
+    assert f"more than {MOST - 1} presets" in refusal(bpy.ops.softground.bake)
+    choose(names[1:])
+    data.materials.pop()
+    assert len(settings.snapshot(four).kinds[0]) == MOST
+
+
+def test_a_linked_material_keeps_its_preset_until_it_is_local(four, tmp_path):
+    library = tmp_path / "library.blend"
+    stored = bpy.data.materials.new("Stored")
+    stored.softground_preset = "mud"
+    bpy.data.libraries.write(str(library), {stored})
+    bpy.data.materials.remove(stored)
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.materials = ["Stored"]
+    (four.softground.ground.material_slots[1].material,) = wanted.materials
+    with pytest.raises(RuntimeError, match="'Stored' is linked from another file"):
+        bpy.ops.softground.region_preset(slot=1, preset="snow")
+    assert "mud" in {step.surface for step in bake(four).footprints}
+
+
 def test_a_preset_that_is_gone_is_named_with_its_material_and_nothing_changes(four):
     choose(("", "custard"))
     assert "Material 'Yellow' of ground 'Field': There is no preset 'custard'" in refusal(bpy.ops.softground.bake)
     four.softground.ground.data.attributes.new(ground_slots.ATTRIBUTE, "FLOAT", "POINT")
     choose(("", "mud"))
     assert "is not an integer on faces" in refusal(bpy.ops.softground.bake)
+
+
+def test_a_ground_that_is_hard_wherever_somebody_walks_is_refused(four):
+    choose((ground_slots.HARD,) * 4)
+    assert "'Field' is nothing but hard floor under the character's path" in refusal(bpy.ops.softground.bake)
 
 
 def test_a_slot_without_a_material_of_one_s_own_is_refused(four):
@@ -249,3 +295,26 @@ def test_soles_carry_what_sticks_onto_a_hard_material(four):
     y = [(marks.matrix_world @ vertex.co).y for vertex in marks.data.vertices]
     assert y
     assert max(y) < BORDERS[2] + 0.01
+
+
+def test_the_command_line_bakes_what_the_file_says(four, tmp_path):
+    choose()
+    expected = [(row["id"], row["surface"], row["compressed_m3"]) for row in bake(four).report["steps"]]
+    bpy.ops.softground.clear_bake()
+    shot, report = tmp_path / "four.blend", tmp_path / "report.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    done = command_line.run("bake", shot, "--dry-run", "--report", report)
+    assert done.returncode == 0, done.stderr
+    steps = json.loads(report.read_text())["steps"]
+    assert [(row["id"], row["surface"], row["compressed_m3"]) for row in steps] == expected
+
+
+def test_live_footprints_are_those_of_the_bake(four):
+    choose()
+    four.frame_set(four.softground.frame_start)
+    bpy.ops.softground.live()
+    four.frame_set(four.softground.frame_end)
+    bpy.ops.softground.live(keep=True)
+    kept = baked_ground.record_of(four.softground.ground).footprints
+    bpy.ops.softground.clear_bake()
+    assert bytes_of(kept) == bytes_of(bake(four).footprints)
