@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 from softground_addon.blender import jobs
-from softground_addon.blender.baking import bake_job
+from softground_addon.blender.baking import bake_job, shot_prints
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
 from tests.benchmarks.test_playback_speed import heavy_walker
@@ -109,3 +109,48 @@ def test_a_bake_under_weather_takes_at_most_a_tenth_longer(scene, preset):
     without, with_weather = min(seconds[False]), min(seconds[True])
     print(f"\n{preset}: {without:.2f} s, with weather {with_weather:.2f} s, {with_weather / without:.3f} times")
     assert with_weather <= 1.1 * without
+
+
+def seconds_to_bake(scene):
+    """Processor time of a bake [s]."""
+    started = time.process_time()
+    jobs.run(bake_job.bake(scene))
+    return time.process_time() - started
+
+
+def walk_in_snow(scene, frames):
+    """A walk with the settings that scenes begin with, and what its first bake takes [s]."""
+    shots.walker(scene, frames=frames)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.relief, options.debris, options.cell_size, options.sink_feet = "FINE", True, 0.0051, True
+    return seconds_to_bake(scene)
+
+
+@pytest.mark.parametrize("frames", [96, 800])
+def test_a_bake_on_the_ground_of_the_first_takes_little_longer(scene, frames):
+    first = walk_in_snow(scene, frames)
+    again = min(_anew(scene) for _ in range(3))
+    print(f"\n{frames} frames: first {first:.2f} s, on its ground {again:.2f} s, {again / first:.2f} times")
+    assert again < 1.5 * first
+
+
+def _anew(scene):
+    shot_prints.forget()
+    return seconds_to_bake(scene)
+
+
+@pytest.mark.parametrize(
+    ("setting", "values", "share"), [("relief_strength", (0.8, 1.0), 0.8), ("relief", ("OFF", "FINE"), 0.8)]
+)
+def test_relief_changed_and_baked_again_presses_nothing(scene, setting, values, share):
+    walk_in_snow(scene, 400)
+    took = {True: [], False: []}
+    for number in range(6):
+        setattr(scene.softground, setting, values[number // 2 % 2])
+        if number % 2:
+            shot_prints.forget()
+        took[bool(number % 2)].append(seconds_to_bake(scene))
+    whole, again = min(took[True]), min(took[False][1:])
+    print(f"\n{setting}: whole {whole:.2f} s, again {again:.2f} s, {again / whole:.2f} times")
+    assert again < share * whole
