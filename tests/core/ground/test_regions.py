@@ -14,7 +14,7 @@ from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.presets import find
-from softground_addon.core.ground.regions import NOWHERE, GroundKind, Regions, numbered
+from softground_addon.core.ground.regions import HARD, GroundKind, Regions, numbered
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.ground.terrain import MeshTerrain
@@ -114,7 +114,7 @@ def test_one_kind_is_as_if_there_were_no_regions_bit_for_bit():
 def test_slots_of_one_preset_are_one_kind():
     kinds, numbers = numbered(FOUR[0], {1: FOUR[1], 2: FOUR[0], 3: None, 5: FOUR[1]})
     assert kinds == FOUR[:2]
-    assert numbers == {1: 1.0, 2: 0.0, 3: NOWHERE, 5: 1.0}
+    assert numbers == {1: 1.0, 2: 0.0, 3: HARD, 5: 1.0}
 
 
 def test_shares_are_one_in_sum_and_go_over_evenly_across_two_cells():
