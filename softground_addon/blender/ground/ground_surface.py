@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
-from ...core.ground.regions import NOWHERE
+from ...core.ground.regions import HARD
 from ...core.ground.terrain import MeshTerrain
 from ...core.numerics.slices import Slices, sliced
 from .. import ground_slots, mesh_arrays
@@ -69,7 +69,7 @@ class GroundSurface:
 def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
     """A ground's surface where it is not hard as a function of place, within bounds in the plane [m]."""
     triangles, kinds, name = surface.triangles, surface.kinds, f"Ground '{surface.name}'"
-    is_soft = np.True_ if kinds is None else kinds != NOWHERE
+    is_soft = np.True_ if kinds is None else kinds != HARD
     if kinds is not None and not is_soft.all():
         triangles, kinds = triangles[is_soft], kinds[is_soft]
     mesh = surface.surface_vertices, triangles, bounds, surface.factors
@@ -87,7 +87,7 @@ def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[Me
 @sliced
 def hard_part(surface: GroundSurface | None, bounds: Array | None = None) -> Slices[list[MeshTerrain]]:
     """A ground's surface where it is hard; none where it is not, within bounds in the plane [m]."""
-    if surface is None or surface.kinds is None or not (hard := surface.kinds == NOWHERE).any():
+    if surface is None or surface.kinds is None or not (hard := surface.kinds == HARD).any():
         return []
     with suppress(InputError):  # nobody walks there
         return [(yield from MeshTerrain.from_mesh.slices(surface.surface_vertices, surface.triangles[hard], bounds))]

@@ -92,8 +92,9 @@ class Shot:
     def regions(self, wanted: BakeSettings) -> Regions | None:
         """Where the ground is made of something else than the rest."""
         ground = soft_ground(self.terrain)
-        has_some = self.surface is not None and self.surface.kinds is not None and isinstance(ground, MeshTerrain)
-        return Regions(wanted.kinds[0], ground) if has_some and isinstance(ground, MeshTerrain) else None
+        if self.surface is None or self.surface.kinds is None or not isinstance(ground, MeshTerrain):
+            return None
+        return Regions(wanted.kinds[0], ground)
 
 
 def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:

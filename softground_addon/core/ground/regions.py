@@ -18,8 +18,8 @@ MOST = 16
 """Kinds of ground that one ground may have."""
 BORDER = 1
 """Cells on each side of a border over which one kind goes over into the other."""
-NOWHERE = -1.0
-"""Number of the kind beside the ground, and where it is hard."""
+HARD = -1.0
+"""Number where the ground is hard, and of no kind."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,6 @@ class Regions:
     kinds: tuple[GroundKind, ...]
     where: MeshTerrain
 
-    def numbers(self, x: Array, y: Array) -> Array:
-        """Numbers of the kinds at world positions of any shape [m], `NOWHERE` beside the ground."""
-        return np.nan_to_num(self.where.interpolated(x, y)[-1], nan=NOWHERE)
-
     def under(self, within: Window, window: Window, cell_size: float) -> tuple[list[int], Array | None]:
         """Kinds of ground under a part of a window of cells, and the share of each in the cells of the window.
 
@@ -71,9 +67,9 @@ class Regions:
         inner, around = within.expanded(BORDER), window.expanded(BORDER)
         kinds = np.unique(self.where.values[self.where.within(*inner.corners(cell_size)), 0, -1])
         if len(kinds) > 1:
-            numbers = self.numbers(*np.meshgrid(*around.centres(cell_size)))
+            numbers = self.where.interpolated(*np.meshgrid(*around.centres(cell_size)))[-1]
             kinds = np.unique(numbers[around.slices(inner)])
-            kinds = kinds[kinds != NOWHERE]
+            kinds = kinds[~np.isnan(kinds)]  # beside the ground
         found = kinds.astype(int).tolist() or [0]
         if len(found) == 1:
             return found, None
@@ -85,7 +81,7 @@ class Regions:
 def numbered(
     own: GroundKind, of_slots: Mapping[int, GroundKind | None]
 ) -> tuple[tuple[GroundKind, ...], dict[int, float]]:
-    """Each kind of ground once, and its number for each slot that names one; `NOWHERE` of those that are hard.
+    """Each kind of ground once, and its number for each slot that names one; `HARD` of those that are hard.
 
     Parameters
     ----------
@@ -95,7 +91,7 @@ def numbered(
         None of what is hard.
     """
     kinds = list(dict.fromkeys([own, *(kind for kind in of_slots.values() if kind)]))
-    return tuple(kinds), {slot: float(kinds.index(kind)) if kind else NOWHERE for slot, kind in of_slots.items()}
+    return tuple(kinds), {slot: float(kinds.index(kind)) if kind else HARD for slot, kind in of_slots.items()}
 
 
 def _sum_around(values: NDArray[np.bool_]) -> Array:

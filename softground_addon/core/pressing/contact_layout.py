@@ -13,7 +13,7 @@ from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .ground_cells import GroundCells, Imprints, Timing
-from .kind_shares import across, bears_most, in_shares
+from .kind_shares import across
 from .rim import in_contact, lean_of_landing, leaning, rim_weights, whole_reach
 
 Array = NDArray[np.float64]
@@ -95,13 +95,12 @@ class ContactLayout(ABC):
 
     def _across(self, of_kinds: Sequence[Imprints], shares: Array, kinds: Sequence[GroundCells]) -> Imprints:
         """The imprints across borders between kinds of ground, whose shares in each cell are (K, rows, columns)."""
-        most = bears_most(of_kinds, shares)
-        laid, cells = of_kinds[most], kinds[most]
-        coverage = in_shares([each.coverage for each in of_kinds], shares).astype(np.float32)
-        contact, lean = in_contact(coverage), self.lean[laid.first - self.first : laid.end - self.first]
-        toward = cells.material.rim_bias * lean.repeat(laid.parts, axis=0) if cells.material.rim_bias else None
-        rim = rim_weights(coverage, contact, cells.rim_reach, cells.surface(laid.window).bears, toward)
-        return replace(across(of_kinds, shares, most), coverage=coverage, contact=contact, rim=rim)
+        laid, most = across(of_kinds, shares)
+        cells, bias = kinds[most], kinds[most].material.rim_bias
+        contact, lean = in_contact(laid.coverage), self.lean[laid.first - self.first : laid.end - self.first]
+        toward = bias * lean.repeat(laid.parts, axis=0) if bias else None
+        rim = rim_weights(laid.coverage, contact, cells.rim_reach, cells.surface(laid.window).bears, toward)
+        return replace(laid, contact=contact, rim=rim)
 
     def window(self, cells: GroundCells) -> Window:
         """The cells that the whole contact may change, but for ground that slides."""

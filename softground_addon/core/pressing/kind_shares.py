@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 INCOMPRESSIBLE = 0.5
 """Poisson's ratio of ground all of which rises that is compressed; in each cell a factor takes off what does not."""
+HALF = 0.5
+"""Share of a cell from which on its crust holds."""
 
 
 def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
@@ -29,14 +31,8 @@ def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
     return total
 
 
-def bears_most(of_kinds: Sequence[Imprints], shares: Array) -> int:
-    """Which of the kinds has most of the area of contact in its cells."""
-    areas = [float((share * each.coverage).sum()) for each, share in zip(of_kinds, shares, strict=True)]
-    return int(np.argmax(areas))
-
-
-def across(of_kinds: Sequence[Imprints], shares: Array, most: int) -> Imprints:
-    """How much which cells are compressed where each kind of ground has a share in them.
+def across(of_kinds: Sequence[Imprints], shares: Array) -> tuple[Imprints, int]:
+    """Which cells are compressed how much where each kind of ground has a share in them.
 
     Parameters
     ----------
@@ -44,22 +40,27 @@ def across(of_kinds: Sequence[Imprints], shares: Array, most: int) -> Imprints:
         The same steps over the same window, as if all of the ground were of each kind.
     shares : (K, rows, columns) float array
         From `Regions.under`.
+
+    Returns
+    -------
+    imprints : Imprints
+        With the contact, the rim and the loads of the kind that bears most.
     most : int
-        The kind that bears most, whose coverage, rim and loads stand for all.
+        Which that is: it has most of the area of contact.
     """
-    laid = of_kinds[most]
+    areas = [float((share * each.coverage).sum()) for each, share in zip(of_kinds, shares, strict=True)]
+    laid = of_kinds[most := int(np.argmax(areas))]
     raised = sum(share * 2.0 * each.material.poisson_ratio for each, share in zip(of_kinds, shares, strict=True))
     even = laid.factors or Factors(*np.ones((3, *shares.shape[1:])))
-    holds = None
-    if any(each.holds is not None for each in of_kinds):
-        held = [np.zeros(1) if each.holds is None else each.holds.astype(float) for each in of_kinds]
-        holds = in_shares(held, shares) > 0.5
-    return replace(
+    held = [np.zeros(1) if each.holds is None else each.holds.astype(float) for each in of_kinds]
+    imprints = replace(
         laid,
+        coverage=in_shares([each.coverage for each in of_kinds], shares).astype(np.float32),
         pressing=np.any([each.pressing for each in of_kinds], axis=0),
         target=in_shares([each.target for each in of_kinds], shares),
         rate=in_shares([each.rate for each in of_kinds], shares),
-        holds=holds,
+        holds=in_shares(held, shares) > HALF if any(each.holds is not None for each in of_kinds) else None,
         factors=Factors(even.stiffness, even.depth, np.asarray(even.rim * raised)),
         material=replace(laid.material, poisson_ratio=INCOMPRESSIBLE),
     )
+    return imprints, most
