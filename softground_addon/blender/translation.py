@@ -26,7 +26,7 @@ _OWNER = object()
 """Owner of the subscription to the language of the preferences."""
 
 
-def translated(text: str, **values: Any) -> str:
+def translated(text: str, /, **values: Any) -> str:
     """A text in the language of the interface, with values in the place of its `{names}`."""
     return bpy.app.translations.pgettext_iface(text, CONTEXT).format(**values)
 
