@@ -26,9 +26,10 @@ _OWNER = object()
 """Owner of the subscription to the language of the preferences."""
 
 
-def translated(text: str, **values: Any) -> str:
+def translated(text: str, /, **values: Any) -> str:
     """A text in the language of the interface, with values in the place of its `{names}`."""
-    return bpy.app.translations.pgettext_iface(text, CONTEXT).format(**values)
+    own = str(bpy.app.translations.pgettext_iface(text, CONTEXT))
+    return own.format(**values) if values else own
 
 
 def catalogue(language: str) -> dict[str, str]:

@@ -94,3 +94,4 @@ def test_no_catalogue_is_read_in_english(addon):
 
 def test_a_text_has_its_values(addon):
     assert translation.translated("{count} steps, {depth}", count=3, depth="2 cm {x}") == "3 steps, 2 cm {x}"
+    assert translation.translated("as it is {x}") == "as it is {x}"

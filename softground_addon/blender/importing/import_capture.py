@@ -96,11 +96,9 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
             new_plate(context, f"{path.stem} Plate {number}", plate, frames(len(plate.force), plate.rate), unit)
         if self.scene_range:
             scene.frame_end = max(first, int(np.floor(poses[-1])))
-        text = (
-            '"{name}": {poses} poses at {rate} Hz and {plates} force plates'
-            if body.plates
-            else '"{name}": {poses} poses at {rate} Hz'
-        )
+        text = '"{name}": {poses} poses at {rate} Hz'
+        if body.plates:
+            text = '"{name}": {poses} poses at {rate} Hz and {plates} force plates'
         values = {"name": rig.name, "poses": len(poses), "rate": f"{body.rate:g}", "plates": len(body.plates)}
         self.report({"INFO"}, translated(text, **values))
         return {"FINISHED"}

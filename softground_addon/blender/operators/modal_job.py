@@ -128,10 +128,8 @@ class ModalJob(bpy.types.Operator):
             return {"CANCELLED"}  # ended by `stop`
         if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
             self._end()
-            self.report(
-                {"INFO"},
-                translated(self.cancelled or "{job} cancelled: nothing was changed", job=translated(self.bl_label)),
-            )
+            text = self.cancelled or "{job} cancelled: nothing was changed"
+            self.report({"INFO"}, translated(text, job=translated(self.bl_label)))
             return {"CANCELLED"}
         if event.type == "TIMER":
             try:
@@ -204,17 +202,12 @@ class ModalJob(bpy.types.Operator):
         passed = time.perf_counter() - self._started
         left = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
-        self._show_status(
-            done,
-            translated(
-                "{stage}: {time} s left", stage=translated(self.stage_names[progress.stage]), time=max(1, round(left))
-            ),
-        )
+        stage = translated(self.stage_names[progress.stage])
+        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(left))))
 
     def _show_status(self, progress: float, status: str) -> None:
-        self._write_status_bar(
-            f"{translated(self.bl_label)} {progress:.0%}  |  {status}  |  {translated('[Esc] Cancel')}"
-        )
+        label, end = translated(self.bl_label), translated("[Esc] Cancel")
+        self._write_status_bar(f"{label} {progress:.0%}  |  {status}  |  {end}")
         session.show_bake(progress, status)
 
     def _write_status_bar(self, text: str | None) -> None:

@@ -270,16 +270,11 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
         with analysis.own_changes(scene):
             mixed = look.apply(options.ground, options.material.surface)
-        look_of = {
-            "ground": options.ground.name,
-            "look": translated(surfaces.find(options.material.surface).label.lower()),
-        }
-        text = (
-            "'{ground}' now looks like {look}, over {count} of your materials"
-            if mixed
-            else "'{ground}' now looks like {look}"
-        )
-        self.report({"INFO"}, translated(text, **look_of, count=mixed))
+        shown = translated(surfaces.find(options.material.surface).label.lower())
+        text = "'{ground}' now looks like {look}"
+        if mixed:
+            text = "'{ground}' now looks like {look}, over {count} of your materials"
+        self.report({"INFO"}, translated(text, ground=options.ground.name, look=shown, count=mixed))
         return {"FINISHED"}
 
 

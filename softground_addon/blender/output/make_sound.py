@@ -106,12 +106,8 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         if compat.PLAYS_SOUND:
             put_strip(scene, path, options.frame_start)
             compat.show_in_sequencer(context, scene)
-        self.report(
-            {"INFO"},
-            translated(
-                "Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}", path=path
-            ),
-        )
+        text = "Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}"
+        self.report({"INFO"}, translated(text, path=path))
         return {"FINISHED"}
 
 

@@ -11,7 +11,7 @@ from .. import settings
 from ..operator_base import reports_errors
 from ..operators.character_editing import active_character
 from ..operators.panel_base import Listed, SidebarPanel
-from ..translation import translated
+from ..translation import CONTEXT, translated
 
 
 def active_hold(character: Any) -> Any:
@@ -120,7 +120,7 @@ class SOFTGROUND_PT_foot_locks(SidebarPanel, bpy.types.Panel):
         column.prop(hold, "strength", slider=True)
         ease = layout.column(align=True)
         ease.prop(hold, "ease_in")
-        ease.prop(hold, "ease_out", text="Out")
+        ease.prop(hold, "ease_out", text="Out", text_ctxt=CONTEXT)
 
 
 CLASSES = (

@@ -15,7 +15,7 @@ from ..ground import painted_ground
 from ..operators import prediction
 from ..operators.character_editing import active_character
 from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
-from ..translation import translated
+from ..translation import CONTEXT, translated
 
 
 class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
@@ -33,7 +33,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "relief")
         amount = column.row()
         amount.active = options.relief != "OFF"
-        amount.prop(options, "relief_strength", text="Amount")
+        amount.prop(options, "relief_strength", text="Amount", text_ctxt=CONTEXT)
         predicted = prediction.of(scene)
         if predicted:
             row = column.row()
@@ -230,7 +230,7 @@ def _wind(layout: Any, ground: Any) -> None:
         return
     for name in ("Wind", "Amount", "Shaped"):
         if (field := debris_object.field_of(debris, name)) is not None:
-            layout.prop(*field, text=name)
+            layout.prop(*field, text=name, text_ctxt=CONTEXT)
 
 
 CLASSES = (

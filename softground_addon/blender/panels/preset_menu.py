@@ -26,8 +26,8 @@ from . import preset_icons
 def title_of_ground(options: Any) -> str:
     """The name of the preset that was loaded last, and whether the ground is still as it says."""
     name = ground_presets.preset_of(options)
-    _, preset = next(_presets_of(name), (None, None))
-    shown = translated(name) if preset else name
+    path, preset = next(_presets_of(name), (None, None))
+    shown = translated(name) if path and path.parent == presets.FOLDER else name
     changed = preset and not ground_presets.holds(options, preset)
     return translated("{name} (modified)", name=shown) if changed else shown
 

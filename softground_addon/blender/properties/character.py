@@ -38,6 +38,7 @@ class SoftGroundJoint(bpy.types.PropertyGroup):
     bone: StringProperty(name="Bone", description="Bone that carries this joint")
     end: EnumProperty(
         name="End",
+        translation_context=CONTEXT,
         description="Which end of the bone is the joint",
         items=[
             ("HEAD", "Head", "The joint is at the bone's head"),

@@ -62,6 +62,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     preset: StringProperty(name="Preset", description="Last preset loaded", default=DEFAULT.name)
     surface: EnumProperty(
         name="Look",
+        translation_context=CONTEXT,
         description="Render material of the ground. It replaces SoftGround's own material, never yours",
         update=_look_changed,
         items=[(surface.name, surface.label, "") for surface in SURFACES.values()],

@@ -190,5 +190,7 @@ def _feed(digest: hashlib._Hash, value: object) -> Slices[None]:
         digest.update(f"({len(value)}".encode())
         for item in value:
             yield from _feed(digest, item)
+    elif type(value).__repr__ is object.__repr__:  # which says where it is, not what
+        raise TypeError(f"{type(value).__name__} has no value to be compared by")
     else:
         digest.update(f"{type(value).__name__}:{value!r};".encode())

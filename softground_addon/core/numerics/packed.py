@@ -42,12 +42,13 @@ class PackedArray(Generic[Number]):
     def __init__(self, first: NDArray[Number], *, is_small: bool = False) -> None:
         self._kind, self._row, self._size = first.dtype, first.shape[1:], len(first)
         whole = np.ascontiguousarray(first)
-        self._parts: list[bytes | NDArray[Number]] = [whole if whole.base is None else whole.copy()]
+        self._parts: list[bytes | NDArray[Number]] = []
         if is_small:
+            self._parts.append(whole.copy())  # what it is part of may be large
             return
         # Of neighbours, the high bytes are much the same and the low ones noise: each kind for itself packs better.
         by_significance = np.ascontiguousarray(_bytes_of(whole).T)
-        self._parts = [zlib.compress(by_significance.data, LEVEL)]
+        self._parts.append(zlib.compress(by_significance.data, LEVEL))
 
     def __len__(self) -> int:
         return self._size

@@ -23,12 +23,12 @@ class ChangesInBlocks:
     Parameters
     ----------
     footprint : Footprint
-    is_alone : bool
-        True where few others are near, and there is room for its changes as they are.
+    is_small : bool
+        As of `PackedArray`.
     """
 
-    def __init__(self, footprint: Footprint, *, is_alone: bool = False) -> None:
-        self.footprint, self._is_alone = footprint, is_alone
+    def __init__(self, footprint: Footprint, *, is_small: bool = False) -> None:
+        self.footprint, self._is_small = footprint, is_small
 
     @cached_property
     def _blocks(self) -> list[list[PackedArray[np.int32]]]:
@@ -44,7 +44,7 @@ class ChangesInBlocks:
         number = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         amount = np.concatenate([changes.amounts for changes in both])
         parts = zip(*(np.split(values[order], ends) for values in (number, cell, amount)), strict=True)
-        packed = [PackedArray(np.stack(part), is_small=self._is_alone) for part in parts]
+        packed = [PackedArray(np.stack(part), is_small=self._is_small) for part in parts]
         return [packed[first : first + across] for first in range(0, len(packed), across)]
 
     def within(self, window: Window) -> tuple[Array, Array]:

@@ -28,8 +28,8 @@ Indices = NDArray[np.intp]
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
 
-FEW = 8
-"""Footprints near places up to which their changes are not packed: some megabytes."""
+ROOM = 50_000
+"""Cells of the footprints near places up to which their changes are not packed: some megabytes."""
 
 _NO_RAMPS = Ramps.joined([], 2)
 
@@ -119,8 +119,9 @@ def vertex_histories(
     near = _near(footprints, places, kernels)
     for number in in_blocks.keys() - set(near):
         del in_blocks[number]
+    is_small = sum(footprints[number].window.cells for number in near) < ROOM
     for number in near:
-        in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_alone=len(near) <= FEW))
+        in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_small=is_small))
     footprints = [footprints[number] for number in near]
     reliefs = [relief[number] if relief else NOTHING for number in near]
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)

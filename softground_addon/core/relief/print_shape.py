@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,7 +154,7 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
 
 def _outline(inside: Mask, far: int) -> Array:
     """Distance of cells to the outline of a print, positive inside, up to `far` [cells]."""
-    to_print, to_ground = distance_to(inside, far), distance_to(~inside, far)
+    to_print, to_ground = nearest(inside, far)[0], nearest(~inside, far)[0]
     return _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0))
 
 
@@ -166,7 +165,7 @@ def _displayed(
     displayed, risen = (_blurred(values, kernel) for values in (compression, rim))
     outside = _blurred((~inside).astype(np.float64), kernel)
     continued = np.where(outside > 0.2, risen / np.maximum(outside, 0.2), risen)
-    to_end = distance_to((displayed <= MOVED) & (risen <= MOVED), far)
+    to_end, _ = nearest((displayed <= MOVED) & (risen <= MOVED), far)
     return displayed, risen, continued, np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0)
 
 
@@ -206,42 +205,22 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     >>> distance.round(3).tolist(), which[1].tolist()
     ([[0.0, 1.0, 2.0], [1.0, 1.414, 2.236]], [0, 0, 0])
     """
-    high, source = _along_columns(chosen, far)
-    best = high.copy()
-    which = np.clip(source, 0, len(chosen) - 1) * chosen.shape[1] + np.arange(chosen.shape[1])
-    in_column = which.copy()
-    for shift, to, beside in _shifts(far, chosen.shape[1]):
-        distance = high[:, beside] + shift * shift
-        closer = distance < best[:, to]
-        np.copyto(best[:, to], distance, where=closer)
-        np.copyto(which[:, to], in_column[:, beside], where=closer)
-    return np.minimum(np.sqrt(best), float(far)), which
-
-
-def distance_to(chosen: Mask, far: int) -> Array:
-    """Distance to the nearest chosen cell's centre [cells], up to `far`: the first of `nearest`, in less time."""
-    high, _ = _along_columns(chosen, far)
-    best = high.copy()
-    for shift, to, beside in _shifts(far, chosen.shape[1]):
-        np.minimum(best[:, to], high[:, beside] + shift * shift, out=best[:, to])
-    return np.asarray(np.minimum(np.sqrt(best), float(far)))
-
-
-def _along_columns(chosen: Mask, far: int) -> tuple[NDArray[np.int32], Indices]:
-    """Squared distance to the nearest chosen cell of each cell's column, and its row."""
-    rows = len(chosen)
+    rows, columns = chosen.shape
     row = np.arange(rows)[:, None]
     below = np.maximum.accumulate(np.where(chosen, row, -far - rows), axis=0)
     above = np.minimum.accumulate(np.where(chosen, row, 2 * rows + far)[::-1], axis=0)[::-1]
     source = np.where(row - below <= above - row, below, above)
-    return np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2, source
-
-
-def _shifts(far: int, columns: int) -> Iterator[tuple[int, slice, slice]]:
-    """Columns, and those beside them to both sides, by how far these are."""
+    high = np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2
+    best = high.copy()
+    which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
+    in_column = which.copy()
     for shift in range(1, min(far, columns - 1) + 1):
-        yield shift, slice(shift, None), slice(None, -shift)
-        yield shift, slice(None, -shift), slice(shift, None)
+        for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
+            distance = high[:, beside] + shift * shift
+            closer = distance < best[:, to]
+            np.copyto(best[:, to], distance, where=closer)
+            np.copyto(which[:, to], in_column[:, beside], where=closer)
+    return np.minimum(np.sqrt(best), float(far)), which
 
 
 def _blurred(values: Array, kernel: Array) -> Array:
