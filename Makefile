@@ -23,7 +23,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving film core test slow versions marathon bench validate validate-ground zoo sheets gui pictures package installed lint types architecture api clean
+.PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving film core test slow versions marathon bench validate validate-ground zoo sheets gui pictures package installed lint types architecture strings api clean
 
 $(READY): $(wildcard requirements/*.txt)
 	$(PYTHON) -m venv $(VENV)
@@ -133,6 +133,10 @@ types: $(LINT_READY)
 # The picture of docs/development.md, drawn from the import contracts.
 architecture:
 	$(PYTHON) -m release.architecture docs/images/architecture.svg
+
+# What catalogues of the interface's languages lack or need no more.
+strings: $(READY)
+	$(BIN)/python -m release.strings
 
 # The reference of the library in build/api, from its docstrings; its examples run.
 api: $(READY)

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import html
+import io
 import posixpath
 import re
 from pathlib import Path
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+from PIL import Image
 
 FOLDER = "manual"
 """Where the pages are in the package."""
+
+WIDEST = 1200
+"""Width of pictures on pages [px]: half as much again as that of the text."""
+
+_QUALITY = 82
+"""Quality of those that were wider, as JPEG [%]."""
 
 _NOT_IN_IT = {"development", "gallery", "library", "publishing"}
 """Pages for those who make the add-on or work without Blender, and one that is only pictures."""
@@ -56,8 +64,7 @@ def files(sources: Path) -> dict[str, bytes]:
     for source, page in pages.items():
         parser = MarkdownIt("commonmark").enable("table")
         tokens = parser.parse(texts[source])
-        for name in _follow_links(tokens, source, pages):
-            built[f"{FOLDER}/images/{posixpath.basename(name)}"] = (sources / name).read_bytes()
+        built |= _follow_links(tokens, source, pages, sources)
         text = parser.renderer.render(tokens, parser.options, {})
         whole = _PAGE.format(title=html.escape(titles[page]), contents=contents, text=text)
         built[f"{FOLDER}/{page}"] = whole.encode()
@@ -69,19 +76,19 @@ def anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
-def _follow_links(tokens: list[Token], source: str, pages: dict[str, str]) -> set[str]:
+def _follow_links(tokens: list[Token], source: str, pages: dict[str, str], sources: Path) -> dict[str, bytes]:
     """Let links lead to pages and pictures of the manual, and make those elsewhere in the sources plain text; returns
-    the pictures."""
-    pictures: set[str] = set()
+    the pictures, by their names in the package."""
+    pictures: dict[str, bytes] = {}
     for number, token in enumerate(tokens):
         if token.type == "heading_open":
             token.attrSet("id", anchor(tokens[number + 1].content))
         opened: list[bool] = []
         for child in token.children or ():
             if child.type == "image":
-                picture = _path(source, str(child.attrs["src"]))
-                pictures.add(picture)
-                child.attrSet("src", "images/" + posixpath.basename(picture))
+                name, picture = _fitting(sources / _path(source, str(child.attrs["src"])))
+                pictures[f"{FOLDER}/images/{name}"] = picture
+                child.attrSet("src", f"images/{name}")
             elif child.type == "link_open":
                 opened.append(_follow(child, source, pages))
             if child.type in ("link_open", "link_close"):
@@ -91,6 +98,19 @@ def _follow_links(tokens: list[Token], source: str, pages: dict[str, str]) -> se
         if token.children:
             token.children = [child for child in token.children if not child.hidden]
     return pictures
+
+
+def _fitting(path: Path) -> tuple[str, bytes]:
+    """Name and content of a picture as pages show it: photographs and screenshots that are wider are smaller JPEGs."""
+    if path.suffix not in (".png", ".jpg"):
+        return path.name, path.read_bytes()
+    with Image.open(path) as image:
+        if image.mode != "RGB" or image.width <= WIDEST:
+            return path.name, path.read_bytes()
+        image.thumbnail((WIDEST, image.height), Image.Resampling.LANCZOS)
+        smaller = io.BytesIO()
+        image.save(smaller, "JPEG", quality=_QUALITY, optimize=True, progressive=True)
+    return f"{path.stem}.jpg", smaller.getvalue()
 
 
 def _follow(link: Token, source: str, pages: dict[str, str]) -> bool:

@@ -1,7 +1,7 @@
 """Fig. 4, a landscape: snow turns to sand behind a hill, and five characters cross it, each in their own way.
 
 One walks, one runs over the hill, one is on snowshoes, a heavy one with large feet leaves a trail, a light one with
-tiny feet leaves hardly anything. Snow and sand are one mesh: stiffness, rim and look are painted on it.
+tiny feet leaves hardly anything. Snow and sand are one mesh with two materials, each of which names its preset.
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ PICTURE = (896, 504)
 
 SAND = "sand"
 """Attribute of the ground: how much of it is sand, not snow."""
-SAND_STIFFNESS = 6.0  # times that of snow: 2.25 MPa over 0.375 (the paper, Table 1)
-SAND_RIM = 10.0  # Poisson's ratio 0.5 over 0.05
+SAND_PRESET = "paper_dry_sand"
 
 HILL_HEIGHT, HILL_WIDTH = 0.45, 0.85  # m
 HILL = np.array((1.1, -1.6))
@@ -107,14 +106,14 @@ def snow_to_sand() -> bpy.types.Material:
 
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Landscape:
     """Ground, characters, one bake."""
-    painted = {
-        "softground_stiffness": lambda x, y: 1 + (SAND_STIFFNESS - 1) * sand(x, y),
-        "softground_rim_factor": lambda x, y: 1 + (SAND_RIM - 1) * sand(x, y),
-        SAND: sand,
-    }
     x, y = (terrain.spaced(LOW[axis], HIGH[axis], SPACING) for axis in (0, 1))
-    ground = terrain.add_terrain("Landscape", x, y, height, "snow", scene.collection, painted)
+    ground = terrain.add_terrain("Landscape", x, y, height, "snow", scene.collection, {SAND: sand})
     ground.data.materials[0] = snow_to_sand()
+    beyond = ground.data.materials[0].copy()
+    beyond.softground_preset = SAND_PRESET
+    ground.data.materials.append(beyond)
+    middle = (y[1:] + y[:-1]) / 2
+    ground.data.polygons.foreach_set("material_index", np.repeat(middle < BORDER, len(x) - 1).astype(np.int32))
     scene.frame_start, scene.frame_end = 1, FRAMES
     walkers, bodies = {}, {}
     for name, (body, motion) in motions(scene.render.fps).items():

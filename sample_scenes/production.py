@@ -26,7 +26,7 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import jobs, setting_paths
+from softground_addon.blender import jobs, setting_paths, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import contact_editing
 from softground_addon.blender.ground import baked_ground
@@ -184,9 +184,12 @@ def bake(
         bpy.ops.object.select_all(action="DESELECT")  # a selected mesh would be taken as the ground
         bpy.ops.softground.create_ground()
     result = jobs.run(bake_job.bake(scene, write=write))
-    displaced = 2 * shot.material.poisson_ratio * _painted_range(shot.ground, shot.painted.rim)
+    materials = [kind.material for kind in settings.snapshot(scene).kinds[0]]
+    ratios = [material.poisson_ratio for material in materials]
+    displaced = 2 * np.array([min(ratios), max(ratios)]) * _painted_range(shot.ground, shot.painted.rim)
     share = float(np.clip(displaced[0], 0, 1)), float(np.clip(displaced[1], 0, 1))
-    return Bake(shot.ground, result.footprints, result.report, share, shot.material.layer_depth)
+    deepest = max(material.layer_depth for material in materials)
+    return Bake(shot.ground, result.footprints, result.report, share, deepest)
 
 
 def _painted_range(ground: bpy.types.Object | None, name: str) -> np.ndarray:

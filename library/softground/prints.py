@@ -229,7 +229,7 @@ def press(
         record += result.footprints
         if progress:
             progress((result.frame - motion.frames[0]) / max(motion.frames[-1] - motion.frames[0], 1.0))
-    check_volumes(record, ground.material)
+    check_volumes(record, soft)
     record.sort(key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.sole))
     prints = tuple(_print(footprint, motion.frame_rate) for footprint in record)
     return Prints(prints, size, motion.frame_rate, loads.terrain, tuple(record))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,21 +12,11 @@ from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.presets import Preset
 from ..core.motion.sole_motion import shortest_length
+from .ground_slots import LENGTHS, user_folder
 from .settings import ADD_ON, MATERIAL_FIELDS, material_of, typed
-
-USER_FOLDER = "presets/softground"
-"""Where the user's presets are, below the folder of Blender's user scripts."""
 
 SMALL_SOLE = 0.1
 """Lengths of presets are those of soles of a person; of soles smaller than this they are as much smaller [m]."""
-
-_LENGTHS = ("rim_reach", "blur_sigma")
-"""Fields of a material that go with the soles."""
-
-
-def user_folder() -> Path:
-    """Folder of the user's presets, which may not be there yet."""
-    return Path(bpy.utils.user_resource("SCRIPTS", path=USER_FOLDER))
 
 
 def apply_preset(options: Any, preset: Preset) -> None:
@@ -47,7 +36,7 @@ def as_preset(options: Any, name: str, source: str = "") -> Preset:
         name,
         source,
         options.material.surface,
-        replace(material, **{field: float(f"{getattr(material, field) / scale:.5g}") for field in _LENGTHS}),
+        replace(material, **{field: float(f"{getattr(material, field) / scale:.5g}") for field in LENGTHS}),
         options.pressure,
         typed(options.tread),
         typed(options.cells_along_sole) or None,
@@ -116,7 +105,7 @@ def untouched(options: Any) -> list[tuple[Any, str]]:
 def _of_preset(options: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
     """Contents of a preset: groups of settings, names in them, values."""
     material = options.material
-    scale = {field: typed(options.length_scale) for field in _LENGTHS}
+    scale = {field: typed(options.length_scale) for field in LENGTHS}
     said = [(material, field, getattr(preset.material, field) * scale.get(field, 1.0)) for field in MATERIAL_FIELDS]
     said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
@@ -139,7 +128,7 @@ def fit_cells(options: Any) -> None:
     with suppress(InputError):
         preset = presets.find(preset_of(options), (presets.FOLDER, user_folder()))
         as_said = [
-            character for character in _of_preset(options, preset) if character[1] in _LENGTHS and _is(*character)
+            character for character in _of_preset(options, preset) if character[1] in LENGTHS and _is(*character)
         ]
         before, options.length_scale = options.length_scale, min(1.0, shortest / SMALL_SOLE)
         for group, field, value in as_said if options.length_scale != before else ():

@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import session, tread_images
+from . import session, translation, tread_images
 from .baking import shot_prints
 from .carried import marks_object
 from .compat import remove_scene
@@ -142,8 +142,9 @@ def before_load(*_: Any) -> None:
 
 @persistent
 def after_load(*_: Any) -> None:
-    """An autosave from within a bake may hold its working scene."""
+    """An autosave from within a bake may hold its working scene; opening a file ends all subscriptions."""
     _remove_left_over_scenes()
+    translation.watch()
     if not bpy.app.background:
         _later(compare_bake)
 

@@ -13,6 +13,7 @@ from ..core.errors import SoftGroundError
 from . import settings
 from .characters import character_setup
 from .ground import baked_ground
+from .translation import translated
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -37,7 +38,7 @@ class OnShot:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is any character in the scene."""
-        cast("Any", cls).poll_message_set("Add a character first")
+        cast("Any", cls).poll_message_set(translated("Add a character first"))
         return bool(character_setup.characters_of(settings.options_of(context)))
 
 
@@ -48,7 +49,7 @@ class OnBake:
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is a bake on the scene's ground."""
         ground = settings.options_of(context).ground
-        cast("Any", cls).poll_message_set("Bake the footprints first")
+        cast("Any", cls).poll_message_set(translated("Bake the footprints first"))
         return ground is not None and baked_ground.is_baked(ground)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import handlers, properties, session, state
+from . import handlers, properties, session, state, translation
 from .command_line import cli
 from .ground import look
 from .importing import import_capture
@@ -16,6 +16,7 @@ from .operators import (
     bake_result,
     character_editing,
     give_way,
+    ground_regions,
     hard_ground,
     live_footprints,
     modal_bake,
@@ -54,6 +55,7 @@ CLASSES = (
     *properties.CLASSES,
     *operators.CLASSES,
     *character_editing.CLASSES,
+    *ground_regions.CLASSES,
     *hard_ground.CLASSES,
     *give_way.CLASSES,
     *sample_scene.CLASSES,
@@ -99,9 +101,17 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
+        bpy.types.Material.softground_preset = bpy.props.StringProperty(
+            name="Ground Preset",
+            description="File name of the preset of the ground that has this material, 'none' of a hard floor; empty "
+            "for the ground's own",
+        )
+        undo.callback(delattr, bpy.types.Material, "softground_preset")
         for part in (handlers, menus, help, import_capture):
             part.register()
             undo.callback(part.unregister)
+        translation.watch()
+        undo.callback(translation.unregister)
         state.state.hooks.update(
             follow_look=_follow_look,
             show_depth_cm=prediction.shown_cm,

@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from .state import state
+from .translation import CONTEXT
 
 PANEL_AREAS = ("VIEW_3D",)
 """Editors that show the add-on's panels and overlay."""
@@ -45,6 +46,7 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     show_soles: BoolProperty(name="Soles", description="Outlines of the soles at the current frame", default=True)
     show_forces: BoolProperty(
         name="Forces",
+        translation_context=CONTEXT,
         description="Forces on the soles at the current frame: weight (green), momentum (yellow) and total (red)",
         default=True,
     )

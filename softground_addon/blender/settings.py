@@ -18,7 +18,7 @@ from ..core.rig.recording import SceneUnits
 from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
-from . import tread_images
+from . import ground_slots, tread_images
 from .camera_views import camera_view
 from .state import state
 
@@ -179,6 +179,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         marks=options.marks,
+        regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
     )
 
 
@@ -233,6 +234,7 @@ def character_of(character: Any) -> CharacterSettings:
             for hold in character.holds
         ),
         body=name_of(character.body) if character.body and not armature else None,
+        dirty_soles=character.dirty_soles,
     )
 
 

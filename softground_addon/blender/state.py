@@ -51,6 +51,8 @@ class State:
         Scenes whose first bake was shown in the view.
     presets : dict
         Preset files that were read, each with the time at which it was written [ns]: a panel asks at each drawing.
+    preset_choices : list
+        Presets as the menu of a material slot lists them.
     pictures : ImagePreviewCollection or None
         Of presets, by their paths; None until the first is asked for.
     existing : dict
@@ -60,6 +62,8 @@ class State:
         What the last bake left, after a hash of all that it follows from; see `baking.shot_prints`.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
+    catalogues : dict
+        Translations by context and English text, of each language that Blender's interface has had.
     """
 
     is_baking: bool = False
@@ -86,10 +90,12 @@ class State:
     shown_bake: dict[tuple[int, bytes], Any] = field(default_factory=dict)
     seen_prints: set[int] = field(default_factory=set)
     presets: dict[Path, Any] = field(default_factory=dict)
+    preset_choices: list[tuple[str, str, str]] = field(default_factory=list)
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
     prints: tuple[str, Any] | None = None
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
+    catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 
 
 state = State()

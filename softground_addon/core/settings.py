@@ -15,6 +15,7 @@ from typing import Any
 from .ground.camera_view import CameraView
 from .ground.display_spacing import spacing_of
 from .ground.material import UNSAID, GroundMaterial, Pressure
+from .ground.regions import GroundKind, numbered
 from .loads.cell_limits import Fineness
 from .loads.estimate import ForceModel
 from .response.foot_holds import FootHold
@@ -78,6 +79,8 @@ class CharacterSettings:
     body : ObjectName or None
         The mesh that moves its own parts, or the empty above rigid ones, of a body without an armature; the bones of
         its soles are parts of it.
+    dirty_soles : float
+        Film on its soles as the shot starts, over the thickest that they carry.
     """
 
     armature: ObjectName | None
@@ -90,6 +93,32 @@ class CharacterSettings:
     soles: tuple[SoleSource, ...]
     holds: tuple[FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     body: ObjectName | None = field(default=None, metadata={"said_if_on": True})
+    dirty_soles: float = field(default=0.0, metadata={"said_if_on": True, **_on(Acts.RESPONDING)})
+
+
+@dataclass(frozen=True)
+class RegionSettings:
+    """A material slot of the ground that names a preset.
+
+    Attributes
+    ----------
+    slot : int
+    preset : str
+        Its file name, or 'none' of a hard floor.
+    surface : str
+    material : GroundMaterial or None
+        None of a hard floor, and of a preset that is not there.
+    """
+
+    slot: int
+    preset: str
+    surface: str
+    material: GroundMaterial | None
+
+    @property
+    def kind(self) -> GroundKind | None:
+        """What it is made of; None where it is hard."""
+        return GroundKind(self.surface, self.material) if self.material else None
 
 
 @dataclass(frozen=True)
@@ -158,6 +187,8 @@ class BakeSettings(SceneUnits):
         Whether soles leave on hard ground what sticks to them.
     carve : bool
         Whether bodies carve deep ground where their feet are let down.
+    regions : tuple of RegionSettings
+        Slots of the ground that are made of something else, or are hard.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -194,11 +225,17 @@ class BakeSettings(SceneUnits):
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     carve: bool = field(default=False, metadata={**UNSAID, **_on(Acts.RESPONDING)})
+    regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
 
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
         return spacing_of(self.cell_size_m, self.relief)
+
+    @property
+    def kinds(self) -> tuple[tuple[GroundKind, ...], dict[int, float]]:
+        """Kinds of ground, and the number of that of each slot which names one; see `regions.numbered`."""
+        return numbered(GroundKind(self.surface, self.material), {each.slot: each.kind for each in self.regions})
 
     @property
     def carves(self) -> bool:

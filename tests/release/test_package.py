@@ -44,8 +44,19 @@ def test_it_holds_the_extension_and_nothing_else(built):
 
 
 def test_it_is_small_and_so_are_the_pictures_of_its_page(built):
-    assert built.stat().st_size < 10_000_000
+    assert built.stat().st_size < 6_000_000
     assert all(path.stat().st_size < 500_000 for path in (ROOT / "docs/images").glob("*.jpg"))
+
+
+def test_pages_show_pictures_of_the_package_that_fit(built):
+    with zipfile.ZipFile(built) as archive:
+        pages = "".join(archive.read(name).decode() for name in archive.namelist() if name.endswith(".html"))
+        shown = {f"manual/{source}" for source in re.findall(r'<img src="([^"]+)"', pages)}
+        assert shown == {name for name in archive.namelist() if name.startswith("manual/images/")}
+        for name in (name for name in shown if not name.endswith(".svg")):
+            picture = Image.open(archive.open(name))
+            assert picture.mode != "RGB" or picture.width <= manual.WIDEST, name
+            assert (picture.format == "JPEG") == name.endswith(".jpg")
 
 
 def test_the_page_has_an_icon_a_featured_picture_and_six_more():

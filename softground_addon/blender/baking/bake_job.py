@@ -118,7 +118,10 @@ def bake(
     inputs = wanted.inputs()
     if factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
-    input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
+    if surface and surface.kinds is not None:
+        inputs["regions_crc32"] = f"{zlib.crc32(surface.kinds.tobytes()):08x}"
+    painted = inputs.get("painted_crc32", "") + inputs.get("regions_crc32", "")
+    input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
     findings = [*prints.findings, *said, *edit_findings(left), *response_job.keyed_responses(wanted)]
     of_responses = response_findings(prints.responses)
     build_report = partial(
@@ -144,7 +147,7 @@ def bake(
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
         findings += of_ground
-        marks_object.put(published.ground, marks, surface=wanted.surface, units=wanted)
+        marks_object.put(published.ground, marks, surface=marks.surface if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()

@@ -30,6 +30,7 @@ from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
 from ..response.character_keys import ReadRig
 from ..rigs.rest_pose import legs_of_feet, legs_on_shins
+from ..translation import translated
 
 EXACT = 0.1
 """Keys are left out where straight lines stay within this part of the tolerance of other layers."""
@@ -63,9 +64,11 @@ class CleanFeet:
             when: max(kind["slide"]["max"] for kind in of_one.values()) for when, of_one in self.feet.items() if of_one
         }
         gap = max(max(kind[of]["max"] for of in ("float", "penetration")) for kind in self.feet["after"].values())
-        return (
-            f"Feet slid by up to {largest['before']:.0f} mm, now by {largest['after']:.1f} mm; "
-            f"the largest gap left is {gap:.1f} mm"
+        return translated(
+            "Feet slid by up to {before} mm, now by {after} mm; the largest gap left is {gap} mm",
+            before=f"{largest['before']:.0f}",
+            after=f"{largest['after']:.1f}",
+            gap=f"{gap:.1f}",
         )
 
 

@@ -27,6 +27,7 @@ from ..response.character_keys import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ..rigs.frame_ranges import animated_frames
 from ..sampling.sampling_scene import object_named, sampling_scene, still_there
 from ..sampling.temporary import handlers_silent
+from ..translation import translated
 from . import bake_report
 
 Array = NDArray[np.float64]
@@ -55,8 +56,10 @@ class MadeKeys:
     @property
     def summary(self) -> str:
         """In a line."""
-        unchanged = f"; '{self.source}' is kept" if self.source else ""
-        return f"'{self.action}' animates {len(self.bones)} bones of '{self.character}'{unchanged}"
+        text = "'{action}' animates {count} bones of '{name}'"
+        if self.source:
+            text = "'{action}' animates {count} bones of '{name}'; '{source}' is kept"
+        return translated(text, action=self.action, count=len(self.bones), name=self.character, source=self.source)
 
     @property
     def warning(self) -> str:

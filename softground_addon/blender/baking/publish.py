@@ -84,21 +84,29 @@ def marks_left(
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
 ) -> Slices[Marks | None]:
-    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
+    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`. Of several grounds that stick, those
+    of the one that leaves most.
+    """
     if not made_with.marks:
         return None
-    density = surfaces.find(made_with.surface).density
     shed = shed_volumes(debris) if debris is not None else {}
     shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
-    marking = marks_of.slices(
-        loads,
-        left.steps,
-        terrain,
-        surface=made_with.surface,
-        shed={step: volume * density for step, volume in shed.items()},
-        treads=dict.fromkeys(shod, made_with.tread_m),
-    )
-    return (yield from marking)
+    dirty = {character.name: character.dirty_soles for character in made_with.characters}
+    most: Marks | None = None
+    for surface in dict.fromkeys([made_with.surface, *(step.surface for step in left.footprints if step.surface)]):
+        density = surfaces.find(surface).density
+        marks = yield from marks_of.slices(
+            loads,
+            left.steps,
+            terrain,
+            surface=surface,
+            shed={step: volume * density for step, volume in shed.items()},
+            treads=dict.fromkeys(shod, made_with.tread_m),
+            brought=dirty if surface == made_with.surface else {},
+        )
+        if most is None or (marks and marks.carried.left_behind > most.carried.left_behind):
+            most = marks
+    return most
 
 
 def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:
@@ -169,7 +177,8 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
-    debris_object.put(ground, debris, surface=made_with.surface, units=made_with)
+    of_steps = {step.index: step.left.surface for step in left.steps if step.left and step.left.surface}
+    debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
     return Published(ground, shown, error)
 

@@ -22,6 +22,7 @@ from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import estimate_shot, read_shot, settings_of
 from ..response.response_job import Layer, show_layer
 from ..response.rig_controls import travelling_bone
+from ..translation import translated
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,12 @@ class Travel:
     @property
     def summary(self) -> str:
         """In a line."""
-        return f"'{self.character}' travels at {self.speed:.2f} m/s, keyed on '{self.control}'"
+        return translated(
+            "'{name}' travels at {speed} m/s, keyed on '{control}'",
+            name=self.character,
+            speed=f"{self.speed:.2f}",
+            control=self.control,
+        )
 
 
 def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:

@@ -6,7 +6,7 @@ prints, whoever has changed them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,6 +25,7 @@ from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.numerics.packed import PackedArray
 from ...core.record.edits import StepEdit
+from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
 from ..jobs import Job, Progress, counted, meanwhile
@@ -116,10 +117,20 @@ def _pressed(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mappin
         debris,
         marks,
         pressed.responses,
-        (*findings, *bottomed_out(left.footprints, wanted.material, name)),
+        (*findings, *_bottomed_out(wanted, left.footprints, name)),
         (yield from meanwhile(at_end, happening)),
         {"offsets_mm": offsets_mm(pressed.loads), "forces": pressed.forces, "gaps_mm": gaps},
     )
+
+
+def _bottomed_out(wanted: BakeSettings, footprints: Sequence[Footprint], ground: str) -> list[Finding]:
+    """What to say of steps that end at the bottom of the deepest layer of their surface."""
+    by_depth = sorted(wanted.kinds[0], key=lambda kind: kind.material.deepest)
+    findings = []
+    for surface, material in {kind.surface: kind.material for kind in by_depth}.items():
+        steps = [step for step in footprints if (step.surface or wanted.surface) == surface]
+        findings += bottomed_out(steps, material, ground)
+    return findings
 
 
 def _size(*values: Any) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 import bpy
 import numpy as np
@@ -19,7 +19,7 @@ from ...core.ground.presets import validate_material
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
-from ...core.settings import Acts, BakeSettings
+from ...core.settings import Acts, BakeSettings, RegionSettings
 from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
 from ..debris import debris_object
@@ -76,7 +76,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     left = baked_ground.record_of(ground)
     made_with = _made_with(scene, left)
     names = painted_ground.names_of(ground, made_with.painted)
-    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names)
+    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, made_with.kinds[1])
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
     low, high = _extent(left)
     looking = ground_surface.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
@@ -160,11 +160,20 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             unit_scale_m=units["unit_scale_m"],
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
+            regions=tuple(map(_region, inputs.get("regions", ()))),
         )
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, InputError):
         raise InputError(
             "The stored record of the footprints does not say what they were pressed with: bake again, and edit then."
         ) from None
+
+
+def _region(said: Mapping[str, Any]) -> RegionSettings:
+    """A region as a record says it."""
+    material = validate_material(said["material"], "record") if said["material"] else None
+    if material:
+        surfaces.find(said["surface"])
+    return RegionSettings(int(said["slot"]), str(said["preset"]), str(said["surface"]), material)
 
 
 def _extent(left: record.BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -25,7 +25,7 @@ from ...core.record.edits import StepEdit, from_json
 from .. import ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
-from ..ground_presets import user_folder
+from ..ground_slots import user_folder
 from ..output import export_formats
 from ..response import response_job
 from . import cli_arguments, program

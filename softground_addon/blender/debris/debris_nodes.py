@@ -9,6 +9,7 @@ each in every frame whatever they are [measured]; all else becomes round points,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 from typing import Any
 
@@ -29,6 +30,8 @@ START, LAUNCH = "softground_start", "softground_launch"
 """Its first place [Blender units] and its first speed [Blender units/s]."""
 RANK = "softground_rank"
 """Its place in the order of size, from 0 for the largest."""
+LOOK = "softground_look"
+"""Which of several looks it has, from 0 for that of the ground; only where there are several."""
 RADIUS, VELOCITY, AGE, KIND, STEP = "radius", "velocity", "age", "kind", "step"
 
 SHAPED = 4000
@@ -37,7 +40,15 @@ FULL_TURNS = 12.0
 """How fast pieces turn in the air [rad/s]."""
 
 
-def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.types.Collection, material: Any) -> Any:
+def build(
+    *,
+    frame_rate: float,
+    gravity: float,
+    unit_scale: float,
+    shapes: bpy.types.Collection,
+    material: Any,
+    others: Sequence[tuple[bpy.types.Collection, Any]] = (),
+) -> Any:
     """A new node group.
 
     Parameters
@@ -52,6 +63,8 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
         What large pieces look like, of radius 1.
     material : bpy.types.Material
         Of the small ones.
+    others : sequence of (bpy.types.Collection, bpy.types.Material)
+        The same of further looks, in the order of `LOOK`.
     """
     graph = _Graph()
     geometry, wind, amount, shaped, collection = graph.inputs(shapes)
@@ -65,9 +78,13 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
     large = graph.less(graph.attribute(RANK), shaped)
     geometry = graph.store(geometry, SMALL, graph.logic("NOR", unseen, large), True, "BOOLEAN")
     points = _points(graph, graph.forgotten(geometry, FLIGHT, RANK), material)
-    few = graph.without(geometry, graph.logic("NOT", large))
-    pieces = _pieces(graph, few, graph.logic("NOT", unseen), collection)
-    graph.finish(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, SMALL))
+    few, seen = graph.without(geometry, graph.logic("NOT", large)), graph.logic("NOT", unseen)
+    looks = [seen] if not others else [graph.both(seen, graph.has_look(number)) for number in range(len(others) + 1)]
+    pieces = [_pieces(graph, few, looks[0], collection)]
+    for number, (more, of_small) in enumerate(others, 1):
+        points = graph.shown(points, of_small, graph.has_look(number))
+        pieces.append(_pieces(graph, few, looks[number], more))
+    graph.finish(graph.forgotten(graph.joined(points, *pieces), FLIGHT, RANK, SMALL, *([LOOK] if others else [])))
     return graph.tree
 
 
@@ -104,10 +121,7 @@ def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
     graph.link(geometry, points.inputs["Mesh"])
     graph.link(graph.attribute(SMALL, "BOOLEAN"), points.inputs["Selection"])
     graph.link(graph.attribute(RADIUS), points.inputs["Radius"])
-    shown = graph.node("GeometryNodeSetMaterial")
-    graph.link(points.outputs["Points"], shown.inputs["Geometry"])
-    shown.inputs["Material"].default_value = material
-    return shown.outputs["Geometry"]
+    return graph.shown(points.outputs["Points"], material)
 
 
 def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> Any:
@@ -158,6 +172,20 @@ class _Graph(NodeGraph):
         collection.description = "Objects of radius 1 for the large pieces, one picked for each"
         group = self.node("NodeGroupInput")
         return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
+
+    def shown(self, geometry: Any, material: Any, selection: Any = None) -> Any:
+        """Geometry with a material on some or all of it."""
+        node = self.node("GeometryNodeSetMaterial")
+        self.link(geometry, node.inputs["Geometry"])
+        node.inputs["Material"].default_value = material
+        if selection is not None:
+            self.link(selection, node.inputs["Selection"])
+        return node.outputs["Geometry"]
+
+    def has_look(self, number: int) -> Any:
+        """Return whether a point has a look of several."""
+        look = self.math("SUBTRACT", self.attribute(LOOK, "INT"), float(number))
+        return self.less(self.math("ABSOLUTE", look), 0.5)
 
     def less(self, first: Any, second: Any) -> Any:
         """Return whether one is less than the other."""

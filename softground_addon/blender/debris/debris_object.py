@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, cast
 
 import bpy
@@ -57,6 +59,7 @@ def put(
     *,
     surface: str,
     units: SceneUnits,
+    of_steps: Mapping[int, str] = MappingProxyType({}),
 ) -> bpy.types.Object | None:
     """Let a ground have debris in place of what it may have; None takes that away.
 
@@ -66,6 +69,8 @@ def put(
     debris : Debris or None
     surface : str
     units : SceneUnits
+    of_steps : mapping of int to str
+        Surfaces of steps, by their numbers, on a ground with regions.
     """
     older = BELONGS.kept(ground, wanted=debris is not None and bool(len(debris.birth)))
     _remove_unused()
@@ -75,9 +80,10 @@ def put(
     follows = older is None or older.parent == BELONGS.owner_of(older)  # or the user has given it another parent
     origin = ground.matrix_world.translation if follows else before  # of both, or a line would be drawn between them
     modifier: Any = _modifier_of(older) if older else None
+    looks = list(dict.fromkeys([surface, *(of_steps[number] for number in sorted(of_steps))]))
     with none_left_if_it_fails():
-        points = _points(debris, origin, units)
-        group = _group_for(modifier and modifier.node_group, surface, units)
+        points = _points(debris, origin, units, [looks.index(of_steps.get(n, surface)) for n in debris.step.tolist()])
+        group = _group_for(modifier and modifier.node_group, looks, units)
     obj = older or bpy.data.objects.new(NAME, points)
     if older:
         exchange(older, points)
@@ -171,20 +177,23 @@ def _remove_unused() -> None:
         debris_shapes.remove(shapes)
 
 
-def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
-    """The node group that debris has, or a new one if it is for another surface or other units."""
-    made_for = f"{surface} {units.frame_rate} {units.time_stretch} {units.gravity_m_s2} {units.unit_scale_m}"
+def _group_for(group: Any, looks: Sequence[str], units: SceneUnits) -> Any:
+    """The node group that debris has, or a new one if it is for other surfaces or other units."""
+    surface, *more = looks
+    made_for = f"{' '.join(looks)} {units.frame_rate} {units.time_stretch} {units.gravity_m_s2} {units.unit_scale_m}"
     if group and group.get(MADE_FOR) == made_for:
         return group
     shapes = group and _shapes_of(group)
     if shapes is None or shapes.get(nodes.MARK) != surface:
         shapes = debris_shapes.collection_of(surfaces.find(surface))
+    others = [debris_shapes.collection_of(surfaces.find(other)) for other in more]
     group = nodes.build(
         frame_rate=units.frame_rate * units.time_stretch,
         gravity=units.gravity_m_s2,
         unit_scale=units.unit_scale_m,
         shapes=shapes,
         material=debris_shapes.material_of(shapes),
+        others=[(other, debris_shapes.material_of(other)) for other in others],
     )
     group[MADE_FOR] = made_for
     return group
@@ -220,8 +229,10 @@ def _modifier_of(obj: bpy.types.Object) -> Any:
     return modifier_with(obj, lambda group: bool(group.get(nodes.MARK)))
 
 
-def _points(debris: Debris, origin: Vector, units: SceneUnits) -> bpy.types.Mesh:
-    """Points where the pieces come to rest as seen from an origin [Blender units], with what lets them fly there."""
+def _points(debris: Debris, origin: Vector, units: SceneUnits, looks: Sequence[int]) -> bpy.types.Mesh:
+    """Points where the pieces come to rest as seen from an origin [Blender units], with what lets them fly there, and
+    with their looks where there are several.
+    """
     unit_scale, time_stretch = units.unit_scale_m, units.time_stretch
     start = debris.start - np.array(origin) * unit_scale
     rest = flight.position(start, debris.velocity, debris.drag_time, debris.time, units.gravity_m_s2)
@@ -242,6 +253,7 @@ def _points(debris: Debris, origin: Vector, units: SceneUnits) -> bpy.types.Mesh
         (nodes.LAUNCH, "FLOAT_VECTOR", debris.velocity / unit_scale),
         (nodes.KIND, "INT", debris.kind),
         (nodes.STEP, "INT", debris.step),
+        *([(nodes.LOOK, "INT", np.array(looks))] if any(looks) else []),
     )
     mesh_arrays.add_attributes(points, ((name, kind, values[order]) for name, kind, values in columns))
     return points

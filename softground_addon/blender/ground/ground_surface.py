@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, cast
 
 import bpy
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
+from ...core.ground.regions import HARD
 from ...core.ground.terrain import MeshTerrain
 from ...core.numerics.slices import Slices, sliced
-from .. import mesh_arrays
+from .. import ground_slots, mesh_arrays
 from ..compat import remove_scene
 from ..playback import display_key, playback, weather_modifier
 from . import painted_ground
@@ -51,6 +53,8 @@ class GroundSurface:
         Triangles of the evaluated surface.
     factors : (W, 3) float array, optional
         What is painted on the evaluated surface; see `painted_ground`.
+    kinds : (T,) float array, optional
+        Number of the kind of ground of each triangle, where there are several; see `core.ground.regions.numbered`.
     """
 
     name: str
@@ -58,13 +62,36 @@ class GroundSurface:
     surface_vertices: Array
     triangles: Indices
     factors: Array | None = None
+    kinds: Array | None = None
 
 
 @sliced
 def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
-    """A ground's surface as a function of place, within bounds in the plane [m]."""
-    mesh, name = (surface.surface_vertices, surface.triangles), f"Ground '{surface.name}'"
-    return (yield from MeshTerrain.from_mesh.slices(*mesh, bounds, surface.factors, name=name))
+    """A ground's surface where it is not hard as a function of place, within bounds in the plane [m]."""
+    triangles, kinds, name = surface.triangles, surface.kinds, f"Ground '{surface.name}'"
+    is_soft = np.True_ if kinds is None else kinds != HARD
+    if kinds is not None and not is_soft.all():
+        triangles, kinds = triangles[is_soft], kinds[is_soft]
+    mesh = surface.surface_vertices, triangles, bounds, surface.factors
+    try:
+        return (yield from MeshTerrain.from_mesh.slices(*mesh, of_faces=kinds, name=name))
+    except InputError:
+        if is_soft.all():
+            raise
+    raise InputError(
+        f"{name} is nothing but hard floor under the character's path: choose a preset for a material there, in "
+        "Advanced > Ground by Material."
+    )
+
+
+@sliced
+def hard_part(surface: GroundSurface | None, bounds: Array | None = None) -> Slices[list[MeshTerrain]]:
+    """A ground's surface where it is hard; none where it is not, within bounds in the plane [m]."""
+    if surface is None or surface.kinds is None or not (hard := surface.kinds == HARD).any():
+        return []
+    with suppress(InputError):  # nobody walks there
+        return [(yield from MeshTerrain.from_mesh.slices(surface.surface_vertices, surface.triangles[hard], bounds))]
+    return []
 
 
 def parts_of(vertices: Array) -> list[Array]:
@@ -102,9 +129,14 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
 
 @sliced
 def undisturbed_surface(
-    ground: bpy.types.Object, unit_scale: float, painted: painted_ground.Names = ()
+    ground: bpy.types.Object,
+    unit_scale: float,
+    painted: painted_ground.Names = (),
+    regions: Mapping[int, float] = MappingProxyType({}),
 ) -> Slices[GroundSurface]:
     """The ground as it is without any bake, in world space and metres, with what is painted on it.
+
+    `regions` has the number of the kind of ground of each material slot that names one.
 
     Blender is asked for nothing after the first slice.
 
@@ -117,12 +149,12 @@ def undisturbed_surface(
     vertices = rest_vertices(ground, unit_scale)
     to_world = to_world_of(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
-        surface, faces = vertices, mesh_arrays.read_faces(mesh)
+        surface, faces, slots = vertices, mesh_arrays.read_faces(mesh), ground_slots.of_faces(mesh)
         factors = painted_ground.factors(ground, mesh, painted)
     else:
         with undisturbed_copy(ground) as evaluated:
             faces = mesh_arrays.read_faces(evaluated)
-            surface = _transform(to_world, faces.positions)
+            surface, slots = _transform(to_world, faces.positions), ground_slots.of_faces(evaluated)
             factors = painted_ground.factors(ground, evaluated, painted)
         if len(surface) == len(vertices):
             vertices = surface
@@ -130,7 +162,16 @@ def undisturbed_surface(
     triangles = yield from mesh_arrays.triangle_vertices.slices(faces)
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
-    return GroundSurface(name, vertices, surface, triangles, factors)
+    return GroundSurface(name, vertices, surface, triangles, factors, _kinds(slots[faces.triangle_face], regions))
+
+
+def _kinds(slots: NDArray[np.int32], regions: Mapping[int, float]) -> Array | None:
+    """Numbers of the kinds of ground, by those of slots (T,); None where it is all of the first."""
+    number_of = np.zeros(int(slots.max(initial=0)) + 1)
+    for slot, number in regions.items():
+        number_of[slot : slot + 1] = number
+    kinds: Array = number_of[slots]
+    return kinds if kinds.any() else None
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:

@@ -11,7 +11,8 @@ from typing import Any
 import bpy
 
 from ...core.ground.surfaces import SURFACES
-from ..materials.materials import MARK, OVER, ensure_material, ensure_over
+from ..ground_slots import HARD, OVER, surface_of, theirs
+from ..materials.materials import MARK, ensure_material, ensure_over
 from .baked_ground import display_mesh_of
 
 
@@ -23,7 +24,8 @@ def follow(scene: bpy.types.Scene) -> None:
 
 
 def apply(ground: bpy.types.Object, surface: str) -> int:
-    """Show a surface on a ground, over the user's materials by where its prints are.
+    """Show a surface on a ground, over the user's materials by where its prints are; and in each slot that names a
+    preset, the surface of that. Hard floors stay as they are.
 
     Returns
     -------
@@ -40,22 +42,26 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
 def take_off(obj: bpy.types.Object) -> None:
     """Give an object the user's materials back, over which the add-on's were mixed."""
     for slot in _writable_slots(obj):
-        if (mixed := slot.material) and (theirs := mixed.get(OVER)):
-            _replace(slot, theirs)
+        if (mixed := slot.material) and (under := mixed.get(OVER)):
+            _replace(slot, under)
 
 
 def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
     for slot in _writable_slots(obj):
-        now = slot.material
+        now, own = slot.material, surface
+        if (named := theirs(now)) and named.softground_preset:
+            if named.softground_preset == HARD:
+                continue
+            own = surface_of(now) or surface
         if now is None:
             if over_theirs:
-                slot.material = ensure_material(surface)
-        elif theirs := now.get(OVER):
-            _replace(slot, ensure_over(theirs, surface))
+                slot.material = ensure_material(own)
+        elif mixed_over := now.get(OVER):
+            _replace(slot, ensure_over(mixed_over, own))
         elif now.get(MARK) in SURFACES:
-            slot.material = ensure_material(surface)
+            slot.material = ensure_material(own)
         elif over_theirs and now.get(MARK) is None:
-            slot.material = ensure_over(now, surface)
+            slot.material = ensure_over(now, own)
 
 
 def _writable_slots(obj: bpy.types.Object) -> Iterator[Any]:

@@ -18,6 +18,7 @@ from ...core.errors import InputError
 from ...core.files import files
 from ..operator_base import reports_errors
 from ..settings import frame_rate_of, scene_of, units_of
+from ..translation import translated
 from .captured_rig import new_plate, new_rig
 
 LARGEST = 2**29
@@ -95,8 +96,11 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
             new_plate(context, f"{path.stem} Plate {number}", plate, frames(len(plate.force), plate.rate), unit)
         if self.scene_range:
             scene.frame_end = max(first, int(np.floor(poses[-1])))
-        plates = f" and {len(body.plates)} force plates" if body.plates else ""
-        self.report({"INFO"}, f'"{rig.name}": {len(poses)} poses at {body.rate:g} Hz{plates}')
+        text = '"{name}": {poses} poses at {rate} Hz'
+        if body.plates:
+            text = '"{name}": {poses} poses at {rate} Hz and {plates} force plates'
+        values = {"name": rig.name, "poses": len(poses), "rate": f"{body.rate:g}", "plates": len(body.plates)}
+        self.report({"INFO"}, translated(text, **values))
         return {"FINISHED"}
 
 

@@ -10,6 +10,7 @@ from .. import jobs, session, settings
 from ..ground import baked_ground, ground_checks
 from ..operator_base import OnBake, reports_errors
 from ..playback import weather_modifier
+from ..translation import translated
 from ..weather import ground_weather as weather
 from ..weather import weather_result
 from .modal_job import Reading, Reports
@@ -61,7 +62,7 @@ class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is weather on the scene's ground."""
         ground = settings.options_of(context).ground
-        cls.poll_message_set("There is no weather on the ground")
+        cls.poll_message_set(translated("There is no weather on the ground"))
         return ground is not None and weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) is not None
 
     @reports_errors

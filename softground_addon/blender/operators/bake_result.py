@@ -13,6 +13,7 @@ from .. import session, settings
 from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
+from ..translation import translated
 from . import remedies
 
 
@@ -28,14 +29,18 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
 def _result(layout: Any, summary: Any) -> None:
     """Result of the bake that is on the ground."""
     typical, most = (f"{depth * 100:.1f} cm" for depth in (summary[bake_report.TYPICAL], summary["max_depth_m"]))
-    depth = typical if typical == most else f"{typical}, up to {most}"
-    layout.label(text=f"{summary['steps']:.0f} steps, {depth}", icon="CHECKMARK", translate=False)
+    depth = typical if typical == most else translated("{typical}, up to {most}", typical=typical, most=most)
+    layout.label(
+        text=translated("{count} steps, {depth}", count=f"{summary['steps']:.0f}", depth=depth),
+        icon="CHECKMARK",
+        translate=False,
+    )
 
 
 def _warnings(layout: Any, warnings: Sequence[str]) -> None:
     """Count of a bake's warnings, which are long, and shown when asked for."""
     if warnings:
-        text = f"{len(warnings)} Warnings" if len(warnings) > 1 else "1 Warning"
+        text = translated("{count} Warnings", count=len(warnings)) if len(warnings) > 1 else translated("1 Warning")
         layout.operator("softground.show_warnings", text=text, icon="ERROR", translate=False)
 
 
@@ -45,7 +50,7 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     if floating < NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
         return
     box = layout.box().column(align=True)
-    box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)
+    box.label(text=translated("Feet float up to {gap} mm", gap=f"{floating:.0f}"), icon="INFO", translate=False)
     box.label(text="above their prints", icon="BLANK1")
     box.operator("softground.sink_feet", text="Sink Feet Now", icon="TRIA_DOWN_BAR")
 
@@ -63,7 +68,7 @@ class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
         return "\n".join(warnings_of(settings.scene_of(context)))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        context.window_manager.popup_menu(_draw_warnings, title=self.bl_label, icon="ERROR")
+        context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:

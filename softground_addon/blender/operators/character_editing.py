@@ -16,6 +16,7 @@ from ..characters.import_fixes import has_legs, walk_ahead
 from ..operator_base import reports_errors
 from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
+from ..translation import translated
 from .modal_job import Reading, Reports
 
 
@@ -62,7 +63,7 @@ class _OnCharacter:
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a character is chosen."""
         if active_character(settings.options_of(context)) is None:
-            cast("Any", cls).poll_message_set("Add a character first")
+            cast("Any", cls).poll_message_set(translated("Add a character first"))
             return False
         return True
 
@@ -123,7 +124,8 @@ class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
         scene = settings.scene_of(context)
         character = self.chosen(scene.softground)
         factor = character_setup.fix_scale(scene, character)
-        self.report({"INFO"}, f"'{character_setup.title_of(character)}' is scaled by {factor:g}")
+        name = character_setup.title_of(character)
+        self.report({"INFO"}, translated("'{name}' is scaled by {factor}", name=name, factor=f"{factor:g}"))
         return {"FINISHED"}
 
 
@@ -155,7 +157,7 @@ def _walking_ahead(scene: bpy.types.Scene, character: Any) -> jobs.Job[Reports]:
     if belt is None or rig is None:
         raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
     walk_ahead(scene, settings.found(rig), -belt)
-    return [("INFO", f"'{name}' travels at {np.linalg.norm(belt):.1f} m/s")]
+    return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
 class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
@@ -168,7 +170,7 @@ class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
         return character_setup.detecting_bones(scene, scene.softground.active_character)
 
     def _show(self, result: list[str]) -> None:
-        self.report({"INFO"}, "Found " + ", ".join(result))
+        self.report({"INFO"}, translated("Found {parts}", parts=", ".join(result)))
 
 
 class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
@@ -201,7 +203,8 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene.softground)
             added = contact_editing.add_object_contacts(scene, character, props)
-        self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")
+        name = character_setup.title_of(character)
+        self.report({"INFO"}, translated("'{name}' also prints with {parts}", name=name, parts=", ".join(added)))
         return {"FINISHED"}
 
 
@@ -232,7 +235,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if active_sole(settings.options_of(context)) is None:
-            cls.poll_message_set("Select a contact in the list first")
+            cls.poll_message_set(translated("Select a contact in the list first"))
             return False
         return True
 

@@ -16,6 +16,7 @@ from .. import mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..operator_base import reports_errors
 from ..plants import give_way, meadow, trampling_table
+from ..translation import translated
 from ..weather.ground_weather import damage_named
 
 
@@ -32,7 +33,7 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the scene has a ground and the active object may give way: a redraw looks at no other."""
-        cls.poll_message_set("Choose a ground, and select plants or litter on it")
+        cls.poll_message_set(translated("Choose a ground, and select plants or litter on it"))
         ground, active = settings.options_of(context).ground, context.active_object
         if ground is None or active is None or not active.select_get() or context.mode != "OBJECT":
             return False
@@ -46,7 +47,8 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
         if linked is not None:
             raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
         _let(ground, chosen, self.kind)
-        self.report({"INFO"}, f"{len(chosen)} objects give way" if len(chosen) > 1 else f"'{chosen[0].name}' gives way")
+        text = "{count} objects give way" if len(chosen) > 1 else "'{name}' gives way"
+        self.report({"INFO"}, translated(text, count=len(chosen), name=chosen[0].name))
         return {"FINISHED"}
 
 
@@ -86,7 +88,7 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the scene has a ground."""
-        cls.poll_message_set("Choose or create a ground first")
+        cls.poll_message_set(translated("Choose or create a ground first"))
         ground = settings.options_of(context).ground
         return ground is not None and ground.type == "MESH" and context.mode == "OBJECT"
 
@@ -105,7 +107,7 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
         for collection in ground.users_collection:
             collection.objects.link(grass)
         _let(ground, [grass], "MEADOW")
-        self.report({"INFO"}, f"Added '{grass.name}'")
+        self.report({"INFO"}, translated("Added '{name}'", name=grass.name))
         return {"FINISHED"}
 
 

@@ -9,6 +9,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..ground import ground_checks
 from ..operator_base import reports_errors
+from ..translation import translated
 
 
 class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
@@ -39,7 +40,7 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         for obj in chosen:
             options.hard_grounds.add().object = obj
         options.active_hard_ground = len(options.hard_grounds) - 1
-        self.report({"INFO"}, f"Soles stand on {', '.join(repr(obj.name) for obj in chosen)}")
+        self.report({"INFO"}, translated("Soles stand on {names}", names=", ".join(repr(obj.name) for obj in chosen)))
         return {"FINISHED"}
 
 

@@ -13,6 +13,7 @@ from ..ground import baked_ground
 from ..live import live, live_mode, live_start
 from ..reading import analysis
 from ..state import state
+from ..translation import translated
 from .modal_job import BUSY, ModalJob, why_no_start
 
 
@@ -34,17 +35,21 @@ class SOFTGROUND_OT_live(ModalJob):
         """True if live mode can start or end; otherwise the button says what is missing."""
         reason = _why_not(context)
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """Effect of the button at the moment."""
         if not live.is_on():
-            return "Press prints while the timeline plays. Move a slider, and the prints follow. Esc cancels"
+            return translated(
+                "Press prints while the timeline plays. Move a slider, and the prints follow. Esc cancels"
+            )
         if properties.keep:
-            return "End live mode and leave the prints on the ground, as a bake up to the current frame. Esc cancels"
-        return "End live mode and leave the ground as it was before"
+            return translated(
+                "End live mode and leave the prints on the ground, as a bake up to the current frame. Esc cancels"
+            )
+        return translated("End live mode and leave the ground as it was before")
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[live_mode.LiveMode | None]:
         if state.live is None:

@@ -10,6 +10,7 @@ import bpy
 from .. import jobs, session, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion, sink_feet
 from ..reading import analysis
+from ..translation import translated
 from . import prediction, show_prints
 from .modal_job import STAGE_NAMES, ModalJob, why_no_start
 
@@ -24,7 +25,7 @@ class _Bake(ModalJob):
         if not reason and session.current().is_live:
             reason = "Live mode is on: press Keep or Discard first"
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
@@ -53,12 +54,16 @@ class _BakeFootprints(_Pressing):
 
     def _show(self, result: bake_job.BakeResult) -> None:
         totals: Any = result.report["totals"]
-        text = f"{totals['steps']} steps, deepest print {totals['max_depth_m'] * 100:.1f} cm"
+        text = translated(
+            "{count} steps, deepest print {depth} cm",
+            count=totals["steps"],
+            depth=f"{totals['max_depth_m'] * 100:.1f}",
+        )
         steps: Any = result.report["steps"]
         scene = settings.scene_of(bpy.context)
         if steps and all(scene.frame_current < step["frame_start"] for step in steps):
             if bpy.app.background:
-                text += ". Press Play to see them"
+                text = translated("{summary}. Press Play to see them", summary=text)
             else:  # the ground would look as it did before
                 scene.frame_set(show_prints.last_step(scene))
         if steps and self._is_first:
@@ -85,7 +90,7 @@ class SOFTGROUND_OT_bake_again(_BakeFootprints):
     @classmethod
     def description(cls, _context: bpy.types.Context, _properties: Any) -> str:
         """Changes since the bake, all of them: the panel has a line."""
-        return "\n".join((cls.bl_description, *session.current().stale.splitlines()))
+        return "\n".join((translated(cls.bl_description), *session.current().stale.splitlines()))
 
 
 class SOFTGROUND_OT_sink_feet(_Pressing):
@@ -101,7 +106,8 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
     def _show(self, result: bake_job.BakeResult) -> None:
         gaps: Any = result.report["gaps_mm"]
         largest = max(gap["max"] for of_one in gaps["after"].values() for gap in of_one.values())
-        self.report({"INFO"}, f"Feet stand on their prints; the largest gap left is {largest:.1f} mm")
+        text = translated("Feet stand on their prints; the largest gap left is {gap} mm", gap=f"{largest:.1f}")
+        self.report({"INFO"}, text)
 
 
 class _ChangingTheMotion(_Bake):

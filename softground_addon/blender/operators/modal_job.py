@@ -15,6 +15,7 @@ from .. import jobs, session, settings
 from ..characters.character_setup import characters_of
 from ..operator_base import OnShot, reports_errors
 from ..state import state
+from ..translation import translated
 from .panel_base import CATEGORY
 
 TICK = 0.02
@@ -69,7 +70,7 @@ class ModalJob(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Return whether no other job runs."""
-        cls.poll_message_set(BUSY)
+        cls.poll_message_set(translated(BUSY))
         return not session.current().is_baking
 
     @reports_errors
@@ -113,7 +114,7 @@ class ModalJob(bpy.types.Operator):
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
         manager.progress_begin(0.0, 1.0)
-        self._show_status(0.0, self.stage_names["sample"])
+        self._show_status(0.0, translated(self.stage_names["sample"]))
         manager.modal_handler_add(self)
         state.jobs.append(self)
         for window in manager.windows:
@@ -127,7 +128,8 @@ class ModalJob(bpy.types.Operator):
             return {"CANCELLED"}  # ended by `stop`
         if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
             self._end()
-            self.report({"INFO"}, self.cancelled or f"{self.bl_label} cancelled: nothing was changed")
+            text = self.cancelled or "{job} cancelled: nothing was changed"
+            self.report({"INFO"}, translated(text, job=translated(self.bl_label)))
             return {"CANCELLED"}
         if event.type == "TIMER":
             try:
@@ -147,7 +149,7 @@ class ModalJob(bpy.types.Operator):
             self._started += waited
             if now > self._show_at:
                 self._show_at = now + SHOWN_FOR
-                self._show_status(session.current().progress, "Waiting for the render")
+                self._show_status(session.current().progress, translated("Waiting for the render"))
             return {"PASS_THROUGH"}
         self._gave_way = waited > LONG_DRAWING and not self._gave_way
         if self._gave_way:  # to the events that have come while Blender drew: they wait for its drawing or a tick
@@ -200,10 +202,12 @@ class ModalJob(bpy.types.Operator):
         passed = time.perf_counter() - self._started
         left = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
-        self._show_status(done, f"{self.stage_names[progress.stage]}: {max(1, round(left))} s left")
+        stage = translated(self.stage_names[progress.stage])
+        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(left))))
 
     def _show_status(self, progress: float, status: str) -> None:
-        self._write_status_bar(f"{self.bl_label} {progress:.0%}  |  {status}  |  [Esc] Cancel")
+        label, end = translated(self.bl_label), translated("[Esc] Cancel")
+        self._write_status_bar(f"{label} {progress:.0%}  |  {status}  |  {end}")
         session.show_bake(progress, status)
 
     def _write_status_bar(self, text: str | None) -> None:
@@ -282,7 +286,7 @@ class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Return whether there is a bake to cancel."""
-        cls.poll_message_set("No bake is running")
+        cls.poll_message_set(translated("No bake is running"))
         return bool(session.current().is_baking)
 
     def execute(self, context: bpy.types.Context) -> set[str]:

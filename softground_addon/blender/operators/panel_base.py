@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from .. import session
+from ..translation import CONTEXT
 
 CATEGORY = "SoftGround"
 """The sidebar's tab."""
@@ -22,6 +23,7 @@ class SidebarPanel:
     bl_space_type: Any = "VIEW_3D"
     bl_region_type: Any = "UI"
     bl_category = CATEGORY
+    bl_translation_context = CONTEXT
 
     layout: Any
 

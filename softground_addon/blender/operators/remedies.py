@@ -9,8 +9,9 @@ from typing import Any
 import bpy
 
 from ..characters.character_setup import title_of
+from ..translation import translated
 
-_OF_CHARACTER = {"Walk Ahead": "softground.walk_ahead", r"Scale by [\d.]*\d": "softground.fix_scale"}
+_OF_CHARACTER = {"Walk Ahead": "softground.walk_ahead", r"Scale by ([\d.]*\d)": "softground.fix_scale"}
 """Operators on the character that a warning names, by what it calls their buttons."""
 
 _OPERATORS = {
@@ -34,14 +35,16 @@ def draw(layout: Any, scene: bpy.types.Scene, warnings: Sequence[str], changed: 
         text = "" if name in changed else "\n".join(warning for warning in warnings if name in warning)
         for words, operator in _OF_CHARACTER.items():
             if match := re.search(words, text):
-                layout.operator(operator, text=match[0], translate=False).character = title_of(character)
+                layout.operator(operator, text=_button(match), translate=False).character = title_of(character)
         if "Set Mass" in text:
             layout.prop(character, "mass")
     text = "\n".join(warnings)
     listed = {item.object.name for item in options.hard_grounds if item.object}
     for name in dict.fromkeys(re.findall(r"Press Add '([^']+)'", text)):
         if name not in listed:
-            layout.operator("softground.add_hard_ground", text=f"Add '{name}'", translate=False).object = name
+            layout.operator(
+                "softground.add_hard_ground", text=translated("Add '{name}'", name=name), translate=False
+            ).object = name
     for words, operator in _OPERATORS.items():
         if re.search(words, text):
             button = layout.operator(operator)
@@ -50,3 +53,8 @@ def draw(layout: Any, scene: bpy.types.Scene, warnings: Sequence[str], changed: 
     for words, field in _FIELDS.items():
         if words in text:
             layout.prop(options, field)
+
+
+def _button(match: re.Match[str]) -> str:
+    """What a warning calls a button, in the language of the interface."""
+    return translated("Scale by {factor}", factor=match[1]) if match.lastindex else translated(match[0])

@@ -11,6 +11,7 @@ import bpy
 from mathutils import Vector
 
 from .. import compat, settings
+from ..translation import translated
 from . import show_prints
 
 FILE = Path(__file__).with_name("sample_walk.json")
@@ -159,7 +160,7 @@ class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether an object can be added."""
-        cls.poll_message_set("Leave Edit Mode first")
+        cls.poll_message_set(translated("Leave Edit Mode first"))
         return context.mode == "OBJECT"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -167,7 +168,9 @@ class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
         add_light_and_camera(context, armature)
         if show_prints.is_free(context.area):
             show_prints.turn(context.area, armature.location + FIRST_STEPS, LOOK, FAR)
-        self.report({"INFO"}, f"Added '{armature.name}': press Add Character, then Bake Footprints")
+        self.report(
+            {"INFO"}, translated("Added '{name}': press Add Character, then Bake Footprints", name=armature.name)
+        )
         return {"FINISHED"}
 
 

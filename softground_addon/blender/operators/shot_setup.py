@@ -28,6 +28,7 @@ from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..sampling.body_sampling import deforms
 from ..sampling.rig_checks import is_animated
 from ..sampling.skin_sampling import meshes_on
+from ..translation import translated
 from .modal_job import Reading, Reports
 
 
@@ -92,7 +93,7 @@ def _add(
         remaining = [prop for prop in remaining if prop != name]
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
-            reports.append(("INFO", f"Added '{character.name}' with {soles}"))
+            reports.append(("INFO", translated("Added '{name}' with {soles}", name=character.name, soles=soles)))
         elif is_animated(character.armature) and meshes_on(scene, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
@@ -101,12 +102,14 @@ def _add(
     props = [settings.found(prop) for prop in remaining]
     added = prop_setup.add_props(scene, props) if props else []
     if added:
-        reports.append(("INFO", "Added " + ", ".join(f"'{entry.name}' of {entry.mass:g} kg" for entry in added)))
+        each = [translated("'{name}' of {mass} kg", name=entry.name, mass=f"{entry.mass:g}") for entry in added]
+        reports.append(("INFO", translated("Added {props}", props=", ".join(each))))
     for obj in props:
         if changing := shape_findings([obj]):
             reports.append(("WARNING", changing[0].text))
         elif not selection.moves(obj):
-            reports.append(("WARNING", f"'{obj.name}' does not move: give it keys or a rigid body before you bake"))
+            text = translated("'{name}' does not move: give it keys or a rigid body before you bake", name=obj.name)
+            reports.append(("WARNING", text))
     return reports
 
 
@@ -122,7 +125,7 @@ class SOFTGROUND_OT_use_as_ground(Reading):
         """Return whether a mesh is selected that may be the ground."""
         if not super().poll(context):
             return False
-        cls.poll_message_set("Select the mesh to walk on, not a character")
+        cls.poll_message_set(translated("Select the mesh to walk on, not a character"))
         return _selected_ground(context) is not None or _selected_instance(context) is not None
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
@@ -140,7 +143,7 @@ def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.J
     stays = False
     try:
         options.ground = chosen
-        reports: Reports = [("INFO", f"'{chosen.name}' is now the ground")]
+        reports: Reports = [("INFO", translated("'{name}' is now the ground", name=chosen.name))]
         yield jobs.Progress("sample", 0.0)
         if options.characters:
             yield from _read_for_prediction(scene)
@@ -179,7 +182,8 @@ def _created(scene: bpy.types.Scene) -> jobs.Job[Reports]:
         with analysis.own_changes(scene):
             created_ground.publish(scene, ground, wanted.surface)
     created_ground.select(scene, ground)
-    text = f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices"
+    count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
+    text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
     return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
 
 
@@ -222,10 +226,10 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         scene = settings.scene_of(context)
         ground = scene.softground.ground
         if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene.softground):
-            cls.poll_message_set("There is no bake on the ground")
+            cls.poll_message_set(translated("There is no bake on the ground"))
             return False
         if session.current().is_live:
-            cls.poll_message_set("Live mode is on: press Keep or Discard first")
+            cls.poll_message_set(translated("Live mode is on: press Keep or Discard first"))
             return False
         return True
 
@@ -256,7 +260,7 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is a ground."""
-        cls.poll_message_set("Choose a ground first, or bake one")
+        cls.poll_message_set(translated("Choose a ground first, or bake one"))
         return settings.exists(settings.options_of(context).ground)
 
     @reports_errors
@@ -266,9 +270,11 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
         with analysis.own_changes(scene):
             mixed = look.apply(options.ground, options.material.surface)
-        theirs = f", over {mixed} of your materials" if mixed else ""
-        label = surfaces.find(options.material.surface).label.lower()
-        self.report({"INFO"}, f"'{options.ground.name}' now looks like {label}{theirs}")
+        shown = translated(surfaces.find(options.material.surface).label.lower())
+        text = "'{ground}' now looks like {look}"
+        if mixed:
+            text = "'{ground}' now looks like {look}, over {count} of your materials"
+        self.report({"INFO"}, translated(text, ground=options.ground.name, look=shown, count=mixed))
         return {"FINISHED"}
 
 
@@ -283,10 +289,10 @@ class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Return whether the file on disk is the one that is open."""
         if not bpy.data.filepath:
-            cls.poll_message_set("Save the file first: the command bakes it from there")
+            cls.poll_message_set(translated("Save the file first: the command bakes it from there"))
             return False
         if bpy.data.is_dirty and not bpy.app.background:  # in background it always is
-            cls.poll_message_set("Save your changes first: the command bakes the file as it is saved")
+            cls.poll_message_set(translated("Save your changes first: the command bakes the file as it is saved"))
             return False
         return True
 

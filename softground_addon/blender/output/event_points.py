@@ -14,6 +14,7 @@ from ...core.events.phases import KINDS
 from .. import settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
+from ..translation import translated
 
 NAME = "SoftGround Events"
 
@@ -98,7 +99,9 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         table = _events(context)
         shown = add_points(settings.scene_of(context), table)
-        self.report({"INFO"}, f"{len(table)} events are the points of '{shown.name}'")
+        self.report(
+            {"INFO"}, translated("{count} events are the points of '{name}'", count=len(table), name=shown.name)
+        )
         return {"FINISHED"}
 
 
@@ -120,7 +123,7 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = add_markers(settings.scene_of(context), _events(context), set(self.phases))
-        self.report({"INFO"}, f"Marked {count} events")
+        self.report({"INFO"}, translated("Marked {count} events", count=count))
         return {"FINISHED"}
 
 

@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
 from ..operator_base import OnBake, beside_file, reports_errors
+from ..translation import translated
 from . import event_exports, exports, image_exports, opensim_exports, sound_exports
 
 LARGEST_IMAGE = 16384
@@ -317,8 +318,11 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         written = export(
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
         )
-        what = str(written[0]) if len(written) == 1 else f"{len(written)} files to {path.parent}"
-        self.report({"INFO"}, f"Wrote {what}")
+        if len(written) == 1:
+            text = translated("Wrote {path}", path=written[0])
+        else:
+            text = translated("Wrote {count} files to {folder}", count=len(written), folder=path.parent)
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 
@@ -333,7 +337,7 @@ class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         still = exports.final_mesh(scene, scene.softground.ground)
-        self.report({"INFO"}, f"Added '{still.name}'")
+        self.report({"INFO"}, translated("Added '{name}'", name=still.name))
         return {"FINISHED"}
 
 

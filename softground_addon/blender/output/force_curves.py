@@ -23,6 +23,7 @@ from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
+from ..translation import translated
 
 Array = NDArray[np.float64]
 
@@ -191,7 +192,7 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
                 if context.mode == "OBJECT":
                     context.view_layer.objects.active = empty
         names = ", ".join(f"'{empty.name}'" for empty in empties)
-        self.report({"INFO"}, f"The forces are on {names}")
+        self.report({"INFO"}, translated("The forces are on {names}", names=names))
         return {"FINISHED"}
 
 
@@ -218,11 +219,11 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         try:
             estimates = estimates_of(analysis.read(scene).loads, frames)
         except SoftGroundError as error:  # the record exists without its characters
-            self.report({"WARNING"}, f"Normal forces only, as the shot cannot be read: {error}")
+            self.report({"WARNING"}, translated("Normal forces only, as the shot cannot be read: {error}", error=error))
             estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
         files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), estimates))
-        self.report({"INFO"}, f"Wrote {path}")
+        self.report({"INFO"}, translated("Wrote {path}", path=path))
         return {"FINISHED"}
 
 

@@ -12,6 +12,7 @@ from ...core.errors import InputError
 from ...core.files import files
 from .. import compat, settings
 from ..operator_base import OnBake, beside_file, reports_errors
+from ..translation import translated
 from . import sound_exports
 
 STRIP = "SoftGround Footsteps"
@@ -80,7 +81,9 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         layout.prop(self, "samples")
         layout.prop(self, "stereo")
         if _is_others(settings.scene_of(context), beside_file(FILE)):
-            layout.label(text=f"There is a {beside_file(FILE).name} already", icon="ERROR", translate=False)
+            layout.label(
+                text=translated("There is a {file} already", file=beside_file(FILE).name), icon="ERROR", translate=False
+            )
             layout.prop(self, "replace")
 
     @reports_errors
@@ -103,7 +106,8 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         if compat.PLAYS_SOUND:
             put_strip(scene, path, options.frame_start)
             compat.show_in_sequencer(context, scene)
-        self.report({"INFO"}, f"Wrote {path}" + (", and put it into the sequencer" if compat.PLAYS_SOUND else ""))
+        text = "Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}"
+        self.report({"INFO"}, translated(text, path=path))
         return {"FINISHED"}
 
 

@@ -11,6 +11,7 @@ from .. import settings
 from ..operator_base import reports_errors
 from ..operators.character_editing import active_character
 from ..operators.panel_base import Listed, SidebarPanel
+from ..translation import CONTEXT, translated
 
 
 def active_hold(character: Any) -> Any:
@@ -29,7 +30,7 @@ class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a character with an armature is chosen."""
-        cls.poll_message_set("Choose a character with an armature first")
+        cls.poll_message_set(translated("Choose a character with an armature first"))
         character = active_character(settings.options_of(context))
         return bool(character and settings.exists(character.armature))
 
@@ -73,7 +74,7 @@ class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether one is chosen."""
-        cls.poll_message_set("Select a foot lock in the list first")
+        cls.poll_message_set(translated("Select a foot lock in the list first"))
         return active_hold(active_character(settings.options_of(context))) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -119,7 +120,7 @@ class SOFTGROUND_PT_foot_locks(SidebarPanel, bpy.types.Panel):
         column.prop(hold, "strength", slider=True)
         ease = layout.column(align=True)
         ease.prop(hold, "ease_in")
-        ease.prop(hold, "ease_out", text="Out")
+        ease.prop(hold, "ease_out", text="Out", text_ctxt=CONTEXT)
 
 
 CLASSES = (

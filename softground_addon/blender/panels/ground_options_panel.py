@@ -8,13 +8,14 @@ import bpy
 
 from ...core.composers.relief_plan import IMAGE
 from ...core.loads.cell_limits import Coverage, Fineness, duration
-from .. import settings
+from .. import ground_slots, settings
 from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import painted_ground
 from ..operators import prediction
 from ..operators.character_editing import active_character
 from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..translation import CONTEXT, translated
 
 
 class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
@@ -32,7 +33,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "relief")
         amount = column.row()
         amount.active = options.relief != "OFF"
-        amount.prop(options, "relief_strength", text="Amount")
+        amount.prop(options, "relief_strength", text="Amount", text_ctxt=CONTEXT)
         predicted = prediction.of(scene)
         if predicted:
             row = column.row()
@@ -58,6 +59,8 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         if options.debris and options.ground is not None:
             _wind(column, options.ground)
         column.prop(options, "marks")
+        if options.marks and (character := active_character(options)):
+            column.prop(character, "dirty_soles")
         if options.marks and options.ground is not None and (marks := marks_object.of(options.ground)):
             for name, field in marks_object.fields_of(marks):
                 column.prop(*field, text=name)
@@ -120,6 +123,27 @@ class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
+class SOFTGROUND_PT_regions(AdvancedPanel, bpy.types.Panel):
+    """What the ground is made of in each of its materials"""
+
+    bl_label = "Ground by Material"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        ground = settings.options_of(context).ground
+        return ground is not None and (len(ground.material_slots) > 1 or any(ground_slots.naming(ground)))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.fields().column(align=True)
+        for number, slot in enumerate(settings.options_of(context).ground.material_slots):
+            material = ground_slots.theirs(slot.material)
+            row = column.split(factor=0.45, align=True)
+            row.label(text=material.name if material else "", icon="MATERIAL", translate=False)
+            title = ground_slots.title_of(material)
+            row.alert = title.startswith("?")
+            row.operator_menu_enum("softground.region_preset", "preset", text=title).slot = number
+
+
 class SOFTGROUND_UL_hard_grounds(Listed):
     """Hard objects by name."""
 
@@ -167,14 +191,31 @@ class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
 
 def vertices(wanted: float, most: int) -> str:
     """Vertices of a close-up along all of a trail, and if there may be fewer."""
-    text = f"About {rounded(wanted):,.0f} vertices along the whole trail"
-    return text if wanted <= most else f"{text}, over Max Vertices"
+    count = f"{rounded(wanted):,.0f}"
+    if wanted <= most:
+        return translated("About {count} vertices along the whole trail", count=count)
+    return translated("About {count} vertices along the whole trail, over Max Vertices", count=count)
 
 
 def estimate(coverage: Coverage, fine: Fineness) -> str:
     """Cells that a bake changes, and the memory and time that it takes."""
     cells, (memory, time) = coverage.cells(fine.cell_size, fine.rim_reach), coverage.bake_costs(fine)
-    return f"About {rounded(cells):,.0f} cells, {rounded(memory / 1e6):,.0f} MB, {duration(time)}"
+    return translated(
+        "About {cells} cells, {memory} MB, {time}",
+        cells=f"{rounded(cells):,.0f}",
+        memory=f"{rounded(memory / 1e6):,.0f}",
+        time=lasting(time),
+    )
+
+
+def lasting(time: float) -> str:
+    """A time [s] as it is said, in the language of the interface."""
+    count, unit = duration(time).split()
+    return translated(DURATIONS[unit], count=count)
+
+
+DURATIONS = {"seconds": "{count} seconds", "minutes": "{count} minutes", "hours": "{count} hours"}
+"""Times as they are said, by their units."""
 
 
 def rounded(value: float) -> float:
@@ -189,13 +230,14 @@ def _wind(layout: Any, ground: Any) -> None:
         return
     for name in ("Wind", "Amount", "Shaped"):
         if (field := debris_object.field_of(debris, name)) is not None:
-            layout.prop(*field, text=name)
+            layout.prop(*field, text=name, text_ctxt=CONTEXT)
 
 
 CLASSES = (
     SOFTGROUND_PT_prints,
     SOFTGROUND_PT_material,
     SOFTGROUND_PT_layers,
+    SOFTGROUND_PT_regions,
     SOFTGROUND_PT_painted,
     SOFTGROUND_UL_hard_grounds,
     SOFTGROUND_PT_hard_ground,

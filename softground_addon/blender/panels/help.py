@@ -13,6 +13,7 @@ from .. import settings
 from ..command_line import program
 from ..ground import baked_ground, ground_mesh
 from ..operators.bake_result import warnings_of
+from ..translation import translated
 
 MANUAL = program.PACKAGE / "manual"
 """The manual's pages; the package has them, the sources do not."""
@@ -38,6 +39,7 @@ PAGES = (
     ("bpy.ops.softground.import_capture", "forces.html#your-own-captures"),
     ("bpy.ops.softground.export", "playback.html#other-programs"),
     ("bpy.ops.softground.final_mesh", "playback.html#other-programs"),
+    ("bpy.ops.softground.region_preset", "ground.html#several-grounds-on-one-mesh"),
     ("bpy.ops.softground.*preset", "ground.html"),
     ("bpy.types.softgroundmaterial.*", "ground_law.html#fields"),
     ("bpy.types.softgroundpainted.*", "ground.html#masks"),
@@ -63,7 +65,7 @@ class SOFTGROUND_OT_open_manual(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Return whether this copy of the add-on has a manual."""
-        cls.poll_message_set("The sources have no manual: read docs/, or install the package")
+        cls.poll_message_set(translated("The sources have no manual: read docs/, or install the package"))
         return MANUAL.is_dir()
 
     def execute(self, _context: bpy.types.Context) -> set[str]:

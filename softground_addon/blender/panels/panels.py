@@ -20,6 +20,7 @@ from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
 from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
 from ..settings import is_prop, is_set_up
+from ..translation import translated
 from . import outdated, preset_menu
 
 _LARGE = 1.4
@@ -79,7 +80,8 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             _on_the_spot(layout, settings.scene_of(context), character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
-                text = f"{mass:g} kg by {'Volume' if mass == character.skin_mass else 'Height'}"
+                by_volume = mass == character.skin_mass
+                text = translated("{mass} kg by Volume" if by_volume else "{mass} kg by Height", mass=f"{mass:g}")
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
 
 
@@ -93,8 +95,12 @@ def _scale(layout: Any, scene: Any, character: Any) -> None:
     box = layout.box().column(align=True)
     shown = f"{size:.0f} m" if factor < 1 else f"{size * 100:.2g} cm"
     unit = wrong_unit(size, captured=captured).partition(",")[0]
-    box.label(text=f"{shown} in size: made in {unit}", icon="ERROR", translate=False)
-    box.operator("softground.fix_scale", text=f"Scale by {factor:g}", translate=False)
+    box.label(
+        text=translated("{size} in size: made in {unit}", size=shown, unit=translated(unit)),
+        icon="ERROR",
+        translate=False,
+    )
+    box.operator("softground.fix_scale", text=translated("Scale by {factor}", factor=f"{factor:g}"), translate=False)
 
 
 def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
@@ -211,7 +217,7 @@ _END_WIDTH = 4.8
 def _joint_label(joint: str) -> str:
     """`ankle_l` as people write it."""
     name, _, side = joint.partition("_")
-    return f"{name.capitalize()} {side.upper()}".rstrip()
+    return f"{translated(name.capitalize())} {side.upper()}".rstrip()
 
 
 class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
@@ -248,7 +254,11 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
             row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
             deepest = prediction.asked(scene).material.deepest
             if predicted.depth and predicted.depth > NEARLY_AT_BOTTOM * deepest:
-                layout.label(text=f"Pressed to the bottom, {deepest * 100:.3g} cm", icon="ERROR", translate=False)
+                layout.label(
+                    text=translated("Pressed to the bottom, {depth} cm", depth=f"{deepest * 100:.3g}"),
+                    icon="ERROR",
+                    translate=False,
+                )
         if options.ground is not None:
             _changing_ground(layout, options)
 
@@ -322,8 +332,12 @@ def _apart_from_scene(scene: Any) -> str:
     start, end = options.frame_start, options.frame_end
     if not options.characters or (scene.frame_start >= start and end == scene.frame_end):
         return ""
-    whose = "Animation" if (start, end) == tuple(options.animated_frames) else "Bake"
-    return f"{whose} {start}-{end}, scene {scene.frame_start}-{scene.frame_end}"
+    of_animation = (start, end) == tuple(options.animated_frames)
+    return translated(
+        "Animation {baked}, scene {shown}" if of_animation else "Bake {baked}, scene {shown}",
+        baked=f"{start}-{end}",
+        shown=f"{scene.frame_start}-{scene.frame_end}",
+    )
 
 
 def _live_buttons(layout: Any, state: Any) -> None:
@@ -343,8 +357,8 @@ def _changing_ground(layout: Any, options: Any) -> None:
     modifier = still_ground.changes_with_time(options.ground)
     if modifier:
         box = layout.box().column(align=True)
-        box.label(text=f"'{modifier}' changes its shape", icon="INFO", translate=False)
-        taken = f"Taken as it is at frame {options.frame_start}"
+        box.label(text=translated("'{modifier}' changes its shape", modifier=modifier), icon="INFO", translate=False)
+        taken = translated("Taken as it is at frame {frame}", frame=options.frame_start)
         box.label(text=taken, icon="BLANK1", translate=False)
 
 

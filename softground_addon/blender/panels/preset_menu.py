@@ -15,30 +15,21 @@ from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, jobs, settings
 from ..characters.character_setup import characters_of, title_of
-from ..ground_presets import user_folder
+from ..ground_slots import listed, loaded, user_folder
 from ..operator_base import OnShot, reports_errors
 from ..operators.modal_job import ReadingShot, Reports
 from ..reading import analysis
-from ..state import state
+from ..translation import CONTEXT, translated
 from . import preset_icons
-
-
-def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
-    """The presets of a folder by name, and what is wrong with the files that are none."""
-    loaded, broken = [], []
-    for path in sorted(folder.glob("*.json")):
-        try:
-            loaded.append((path, _loaded(path)))
-        except InputError as error:
-            broken.append(str(error))
-    return sorted(loaded, key=lambda entry: entry[1].name.casefold()), broken
 
 
 def title_of_ground(options: Any) -> str:
     """The name of the preset that was loaded last, and whether the ground is still as it says."""
     name = ground_presets.preset_of(options)
-    _, preset = next(_presets_of(name), (None, None))
-    return f"{name} (modified)" if preset and not ground_presets.holds(options, preset) else name
+    path, preset = next(_presets_of(name), (None, None))
+    shown = translated(name) if path and path.parent == presets.FOLDER else name
+    changed = preset and not ground_presets.holds(options, preset)
+    return translated("{name} (modified)", name=shown) if changed else shown
 
 
 def picture_of_ground(options: Any) -> int:
@@ -50,17 +41,9 @@ def _presets_of(name: str) -> Iterator[tuple[Path, presets.Preset]]:
     """The preset of that name with its file: that which comes with the add-on, and the user's."""
     for path in (presets.FOLDER / _file_name(name), _file_for(name)):
         with suppress(OSError, InputError):
-            preset = _loaded(path)
+            preset = loaded(path)
             if preset.name == name:
                 yield path, preset
-
-
-def _loaded(path: Path) -> presets.Preset:
-    """The preset in a file, read again only where it was written since."""
-    written = path.stat().st_mtime_ns
-    if path not in state.presets or state.presets[path][0] != written:
-        state.presets[path] = written, presets.load(path)
-    return state.presets[path][1]
 
 
 class SOFTGROUND_MT_presets(bpy.types.Menu):
@@ -73,7 +56,7 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
         ours, _ = listed(presets.FOLDER)
         paths = {preset: path for path, preset in ours}
         for section, title in presets.SECTIONS.items():
-            layout.label(text=title)
+            layout.label(text=title, text_ctxt=CONTEXT)
             for preset in presets.soft_to_firm(built_in for built_in in paths if built_in.section == section):
                 _entry(layout, paths[preset], preset, translate=True)
         loaded, broken = listed(user_folder())
@@ -112,7 +95,9 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         depth = analysis.expected_depth(settings.scene_of(context), preset.material)
         if depth is not None:
             who = ", ".join(title_of(c) for c in characters_of(settings.options_of(context)))
-            lines.append(f"Depth of the typical step of {who}: {depth * 100:.1f} cm")
+            lines.append(
+                translated("Depth of the typical step of {who}: {depth} cm", who=who, depth=f"{depth * 100:.1f}")
+            )
         return "\n".join(lines)
 
     @reports_errors
@@ -170,7 +155,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
             if other != path:
                 other.unlink()
         scene.softground.material.preset = name
-        self.report({"INFO"}, f"Saved preset '{name}'")
+        self.report({"INFO"}, translated("Saved preset '{name}'", name=name))
         return {"FINISHED"}
 
 
@@ -184,7 +169,7 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the chosen preset is one of the user's."""
-        cls.poll_message_set("Built-in presets cannot be deleted; choose one of your own")
+        cls.poll_message_set(translated("Built-in presets cannot be deleted; choose one of your own"))
         return _own(context) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -233,7 +218,12 @@ def _predicting(scene: bpy.types.Scene) -> jobs.Job[Reports]:
     known = yield from analysis.reading(scene)
     depth = yield from analysis.working_out_depth(scene)
     deepest = known.contacts.depths.max(initial=0.0)
-    return [("INFO", f"Typical step: {(depth or 0.0) * 100:.1f} cm deep; the deepest: {deepest * 100:.1f} cm")]
+    text = translated(
+        "Typical step: {typical} cm deep; the deepest: {deepest} cm",
+        typical=f"{(depth or 0.0) * 100:.1f}",
+        deepest=f"{deepest * 100:.1f}",
+    )
+    return [("INFO", text)]
 
 
 class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):

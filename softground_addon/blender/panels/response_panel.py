@@ -16,6 +16,7 @@ from ..characters.import_fixes import stature_of
 from ..operators.character_editing import active_character
 from ..operators.panel_base import AdvancedPanel
 from ..response import response_job
+from ..translation import translated
 
 CENTRE_HEIGHT = 0.62
 """Height of a standing body's centre of mass over that of its joints at rest, by the masses of de Leva (1996)."""
@@ -42,7 +43,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the chosen character has bones and a mass, which the paper's values depend on."""
-        cls.poll_message_set("Choose a character with an armature and a mass first")
+        cls.poll_message_set(translated("Choose a character with an armature and a mass first"))
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         return bool(
@@ -87,7 +88,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a bake has told the speed."""
-        cls.poll_message_set("Bake with Sink Feet or Grounding on first: the bake suggests a speed")
+        cls.poll_message_set(translated("Bake with Sink Feet or Grounding on first: the bake suggests a speed"))
         character = active_character(settings.options_of(context))
         return bool(character and character.armature and has_layer(character.armature))
 
@@ -111,7 +112,7 @@ class _RemoveLayer(bpy.types.Operator):
         """True if a character has such a layer and no job runs."""
         characters = settings.options_of(context).characters
         if not any(character.armature and has_layer(character.armature, cls.kinds[0]) for character in characters):
-            cls.poll_message_set("No character has this layer")
+            cls.poll_message_set(translated("No character has this layer"))
             return False
         return not session.current().is_baking
 
@@ -169,7 +170,7 @@ class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
         row.operator("softground.clean_feet", icon="CON_FLOOR")
         row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
         if character and root_motion.speed_of(character.armature):
-            speed = f"Travels at {root_motion.speed_of(character.armature):.2f} m/s"
+            speed = translated("Travels at {speed} m/s", speed=f"{root_motion.speed_of(character.armature):.2f}")
             layout.label(text=speed, translate=False)
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
@@ -214,11 +215,13 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row.label(text=notes.get(response_job.ROOT_CONTROL, ""), translate=False)
     speed = f"{response_job.speed_in(notes):.0%}"
     row = box.split(factor=0.72)
-    row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)
+    row.label(text=translated("Suggested Speed {speed}", speed=speed), icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
     for frame, gap_mm, sole in response_job.worst_gaps_in(notes)[:_SHOWN]:
         if abs(gap_mm) >= NOTICEABLE_GAP_MM:
-            shown = f"Frame {frame:g}: {gap_mm:.1f} mm under {sole}"
+            shown = translated(
+                "Frame {frame}: {gap} mm under {sole}", frame=f"{frame:g}", gap=f"{gap_mm:.1f}", sole=sole
+            )
             box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = frame
 
 

@@ -12,6 +12,7 @@ from ..live import live
 from ..operators import baked_steps
 from ..operators.baked_steps import BakedStep
 from ..operators.panel_base import SidebarPanel
+from ..translation import translated
 
 SHOWN = 9
 """Steps in the list, around the one that is chosen."""
@@ -37,7 +38,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         steps, chosen = baked_steps.of(scene), baked_steps.chosen(scene)
         _list(layout, steps, chosen)
         if len(chosen) > 1:
-            layout.label(text=f"{len(chosen)} steps selected", translate=False)
+            layout.label(text=translated("{count} steps selected", count=len(chosen)), translate=False)
         layout.operator("softground.drag_step", icon="VIEW_PAN")
         if chosen:
             _buttons(layout, chosen)
@@ -64,7 +65,8 @@ def _list(layout: Any, steps: Any, chosen: list[BakedStep]) -> None:
 def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
     """A step as one button: number, side, frames, depth, force."""
     first, last = step.frames
-    depth = "muted" if step.edit.mute else f"{step.depth_cm:.1f} cm" if step.left else "nothing left"
+    nothing = translated("muted") if step.edit.mute else "" if step.left else translated("nothing left")
+    depth = nothing or f"{step.depth_cm:.1f} cm"
     text = f"{step.number} {step.side or step.baked.sole}   {first}-{last}   {depth}   {step.baked.peak_force_n:,.0f} N"
     icon = "DUPLICATE" if step.is_copy else "MODIFIER" if step.is_edited else "BLANK1"
     icon = "HIDE_ON" if step.edit.mute else icon

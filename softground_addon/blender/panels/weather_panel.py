@@ -9,6 +9,7 @@ from ..ground import baked_ground
 from ..live import live
 from ..operators.panel_base import SidebarPanel
 from ..playback import weather_modifier
+from ..translation import translated
 from ..weather import ground_weather as weather
 from ..weather import weather_keys
 
@@ -59,7 +60,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for name, identifier in weather_modifier.inputs_of(modifier).items():
             holder, path = compat.input_field(modifier, identifier)
-            text = f"{name} ({_UNITS[name]})" if name in _UNITS else name
+            text = f"{translated(name)} ({_UNITS[name]})" if name in _UNITS else translated(name)
             column.prop(holder, path, text=text, slider=name == "Halo", translate=False)
         options = settings.options_of(context)
         layout.prop(options, "steps_feel_weather")

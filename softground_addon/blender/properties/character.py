@@ -9,6 +9,7 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from .. import settings
 from ..animation_layer.constraint_layer import LayerKind, set_strength
+from ..translation import CONTEXT
 from .fields import is_mesh, share
 
 DEFAULT_MASS = 77.5
@@ -37,6 +38,7 @@ class SoftGroundJoint(bpy.types.PropertyGroup):
     bone: StringProperty(name="Bone", description="Bone that carries this joint")
     end: EnumProperty(
         name="End",
+        translation_context=CONTEXT,
         description="Which end of the bone is the joint",
         items=[
             ("HEAD", "Head", "The joint is at the bone's head"),
@@ -54,6 +56,7 @@ class SoftGroundSole(bpy.types.PropertyGroup):
 
     side: EnumProperty(
         name="Side",
+        translation_context=CONTEXT,
         description="Side of the body",
         items=[("LEFT", "Left", ""), ("RIGHT", "Right", ""), ("NONE", "None", "Neither left nor right")],
         default="NONE",
@@ -86,6 +89,7 @@ class SoftGroundHold(bpy.types.PropertyGroup):
     frame: IntProperty(name="Frame", description="Any frame in which the foot is planted")
     mode: EnumProperty(
         name="Lock",
+        translation_context=CONTEXT,
         description="What stays in its place during this contact",
         items=[
             ("ROLL", "Roll", "Whatever bears the weight: the foot rolls over heel, ball and toes"),
@@ -98,10 +102,18 @@ class SoftGroundHold(bpy.types.PropertyGroup):
     )
     strength: share("Strength", "0 leaves this contact as animated, 1 locks it", default=1.0)
     ease_in: IntProperty(
-        name="Ease In", description="Frames over which the foot comes to rest after it lands", min=0, soft_max=20
+        name="Ease In",
+        description="Frames over which the foot comes to rest after it lands",
+        translation_context=CONTEXT,
+        min=0,
+        soft_max=20,
     )
     ease_out: IntProperty(
-        name="Ease Out", description="Frames over which the foot starts to leave before it lifts", min=0, soft_max=20
+        name="Ease Out",
+        description="Frames over which the foot starts to leave before it lifts",
+        translation_context=CONTEXT,
+        min=0,
+        soft_max=20,
     )
 
 
@@ -128,6 +140,10 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         soft_max=500.0,
         precision=1,
     )
+    dirty_soles: share(
+        "Dirty Soles",
+        "How much of the ground's snow, mud or wet sand is on its soles as the shot starts: 1 is all that they carry",
+    )
     size: FloatProperty(
         name="Size", description="Size of the rig, which shows whether its scale is wrong", options={"HIDDEN"}
     )
@@ -138,6 +154,7 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     )
     force_model: EnumProperty(
         name="Force Model",
+        translation_context=CONTEXT,
         description="How the force under each foot is estimated from the animation",
         items=[
             ("WHOLE_BODY", "Accurate", "From the acceleration of the body's centre of mass"),

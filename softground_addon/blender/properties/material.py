@@ -12,6 +12,7 @@ from ...core.ground import presets
 from ...core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ...core.ground.surfaces import SURFACES
 from ..state import state
+from ..translation import CONTEXT
 from .fields import in_unit
 
 USUAL_PACKING = 0.6
@@ -61,6 +62,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     preset: StringProperty(name="Preset", description="Last preset loaded", default=DEFAULT.name)
     surface: EnumProperty(
         name="Look",
+        translation_context=CONTEXT,
         description="Render material of the ground. It replaces SoftGround's own material, never yours",
         update=_look_changed,
         items=[(surface.name, surface.label, "") for surface in SURFACES.values()],
@@ -262,6 +264,7 @@ class SoftGroundPainted(bpy.types.PropertyGroup):
     )
     rim: StringProperty(
         name="Rim",
+        translation_context=CONTEXT,
         description="Vertex group or float attribute that multiplies the volume of the rims: 1 leaves "
         "it as set, 0 raises no rim",
         default="softground_rim_factor",

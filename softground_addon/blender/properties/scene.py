@@ -17,6 +17,7 @@ from bpy.props import (
 
 from ...core.ground import field_tests
 from ..state import state
+from ..translation import CONTEXT
 from .character import SoftGroundCharacter
 from .fields import in_unit, is_mesh
 from .material import DEFAULT, SoftGroundMaterial, SoftGroundPainted, by_feel
@@ -134,6 +135,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     detail: EnumProperty(
         name="Detail",
+        translation_context=CONTEXT,
         description="When to hide the ground and press a copy of it that is fine along the trail",
         items=[
             ("AUTO", "Automatic", "Use the copy if the ground is too coarse to show the prints"),
@@ -255,6 +257,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     relief: EnumProperty(
         name="Relief",
+        translation_context=CONTEXT,
         description="Broken edges, crumbs, cracks and tread on the displayed prints. Forces, depths "
         "and the response are not affected",
         items=[

@@ -33,6 +33,7 @@ def with_hard_objects(
     motions: Sequence[CharacterMotion],
     ground: Terrain,
     bounds: Array,
+    own: Sequence[MeshTerrain] = (),
 ) -> Slices[tuple[Terrain, list[Finding]]]:
     """A soft ground with the hard objects that soles stand on, and which of these are not in the settings.
 
@@ -44,9 +45,11 @@ def with_hard_objects(
     ground : Terrain
     bounds : (2, 2) float array
         Lower and upper corner of what is looked at [m].
+    own : sequence of MeshTerrain
+        What of the ground itself is hard.
     """
     unit_scale, reach = wanted.unit_scale_m, reach_of(motions)
-    hard = [top for _, top in (yield from _tops(wanted.hard_grounds, unit_scale, bounds))]
+    hard = [*own, *(top for _, top in (yield from _tops(wanted.hard_grounds, unit_scale, bounds)))]
     terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach) if hard else ground
     raised = [rest for motion in motions for rest in raised_rests(motion, terrain)]
     yield

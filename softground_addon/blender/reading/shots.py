@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -17,6 +17,8 @@ from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.hard_ground import soft_ground
 from ...core.ground.heightfield import Terrain
+from ...core.ground.regions import MOST as MOST_KINDS
+from ...core.ground.regions import Regions
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
@@ -26,7 +28,7 @@ from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping
 from ...core.settings import TIME_LIMIT, BakeSettings
 from ...core.weather.felt_weather import weathering_of
-from .. import setting_paths, settings, tread_images
+from .. import ground_slots, setting_paths, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
 from ..characters.import_fixes import size_of
 from ..ground import ground_checks, ground_surface, painted_ground
@@ -87,6 +89,13 @@ class Shot:
         painted, ground = self.surface is not None and self.surface.factors is not None, soft_ground(self.terrain)
         return PaintedSurface(ground) if painted and isinstance(ground, MeshTerrain) else None
 
+    def regions(self, wanted: BakeSettings) -> Regions | None:
+        """Where the ground is made of something else than the rest."""
+        ground = soft_ground(self.terrain)
+        if self.surface is None or self.surface.kinds is None or not isinstance(ground, MeshTerrain):
+            return None
+        return Regions(wanted.kinds[0], ground)
+
 
 def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     """The scene's settings as they are now (`settings.snapshot`), if they can be baked.
@@ -124,6 +133,12 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
     if ground is not None:
         ground_checks.check_usable(ground)
+        ground_slots.check(ground)
+        if len(wanted.kinds[0]) > MOST_KINDS:
+            raise InputError(
+                f"The materials of ground '{ground.name}' name more than {MOST_KINDS - 1} presets: give some of them "
+                "the same one."
+            )
     for name in wanted.hard_grounds:
         if fault := ground_checks.hard_fault(settings.found(name)):
             raise InputError(fault)
@@ -148,28 +163,42 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
-    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted)
+    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, wanted.kinds[1])
     surface = yield from meanwhile(Progress("sample", 1.0), looking)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
     soft = yield from meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds)
+    own = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
+    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, own)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
 
 
 def _with_hard(
-    scene: bpy.types.Scene, wanted: BakeSettings, motions: list[CharacterMotion], ground: Terrain, bounds: Array
+    scene: bpy.types.Scene,
+    wanted: BakeSettings,
+    motions: list[CharacterMotion],
+    ground: Terrain,
+    bounds: Array,
+    own: Sequence[MeshTerrain] = (),
 ) -> Job[tuple[Terrain, list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds)
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, own)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     """The ground of a shot, with the material and the spread of pressure that are wanted."""
     weathering = weathering_of(wanted.weather, wanted.material.layer_depth)
-    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation, weathering, wanted.gravity_m_s2)
+    return SoftGround(
+        shot.terrain,
+        wanted.material,
+        wanted.pressure,
+        shot.variation,
+        weathering,
+        wanted.gravity_m_s2,
+        shot.regions(wanted),
+    )
 
 
 def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]:

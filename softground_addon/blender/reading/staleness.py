@@ -14,7 +14,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.settings import Acts, BakeSettings, CharacterSettings
-from .. import settings
+from .. import ground_slots, settings
 from ..compat import SERIES
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..ground.baked_ground import display_mesh_of
@@ -26,6 +26,7 @@ from ..rigs.worn_rigs import worn_rigs
 from ..sampling.body_sampling import meshes_of
 from ..sampling.sampling_scene import object_named
 from ..sampling.skin_sampling import meshes_on
+from ..translation import translated
 from . import input_hashes
 
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
@@ -37,6 +38,19 @@ _OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE, HARD)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _UNKNOWN = "The bake has no record of its settings"
+CHANGED = {
+    SETTINGS: "The settings have changed",
+    GROUND: "The mesh or the position of '{name}' has changed",
+    SURFACE: "The modifiers of '{name}', or what is painted on it, have changed",
+    PRINTS: "The mesh of '{name}' has been edited",
+    ANIMATION: "The animation of '{name}' has changed",
+    PLACE: "'{name}' or a parent of it was moved",
+    MOVEMENT: "The rig of '{name}', or what it follows, has changed",
+    BODY: "The mesh of '{name}' that prints has changed",
+    SOLE: "The mesh of '{name}', whose sole presses steps, has changed",
+    HARD: "The mesh or the position of '{name}', which is hard ground, has changed",
+}
+"""What is said of each kind of change."""
 
 
 def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[str, str]) -> None:
@@ -88,9 +102,10 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     if not ground_mesh.is_baked(display_mesh):
         return ()
     if edited := next((obj for obj in (ground, display_mesh, *bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
-        return (f"'{edited.name}' is in Edit Mode",)
+        return (translated("'{name}' is in Edit Mode", name=edited.name),)
     if playback.modifier_of(display_mesh) is None:
-        return (f"'{display_mesh.name}' has lost its playback modifier, and its prints no longer move",)
+        text = "'{name}' has lost its playback modifier, and its prints no longer move"
+        return (translated(text, name=display_mesh.name),)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         of_settings = _of_settings(wanted.inputs(Acts.WRITING))
@@ -100,24 +115,10 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         left_out = () if then.pop(VERSION, "") == SERIES else _OF_VERSION
         changed = [(kind, name) for kind, name in _changes(then, now) if kind not in left_out]
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
-        return (_UNKNOWN,)
-    texts = {
-        SETTINGS: "The settings have changed",
-        GROUND: f"The mesh or the position of '{ground.name}' has changed",
-        SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
-        PRINTS: f"The mesh of '{display_mesh.name}' has been edited",
-    }
-    of_objects = {
-        ANIMATION: "The animation of '{}' has changed",
-        PLACE: "'{}' or a parent of it was moved",
-        MOVEMENT: "The rig of '{}', or what it follows, has changed",
-        BODY: "The mesh of '{}' that prints has changed",
-        SOLE: "The mesh of '{}', whose sole presses steps, has changed",
-        HARD: "The mesh or the position of '{}', which is hard ground, has changed",
-    }
-    return tuple(
-        dict.fromkeys(texts.get(kind) or of_objects.get(kind, _UNKNOWN).format(name) for kind, name in changed)
-    )
+        return (translated(_UNKNOWN),)
+    named = {GROUND: ground.name, SURFACE: ground.name, PRINTS: display_mesh.name}
+    texts = [translated(CHANGED.get(kind, _UNKNOWN), name=named.get(kind, name)) for kind, name in changed]
+    return tuple(dict.fromkeys(texts))
 
 
 def _changes(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[tuple[str, str]]:
@@ -144,8 +145,10 @@ def _in_order(hashes: Mapping[str, str]) -> dict[tuple[str, str], tuple[str, str
 def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
     if ground is None or not baked_ground.is_deleted(ground):
         return ()
-    what = "The copy of '{}' that shows the prints" if settings.exists(ground) else "'{}'"
-    return (f"{what.format(ground.name)} was deleted",)
+    text = (
+        "The copy of '{name}' that shows the prints was deleted" if settings.exists(ground) else "'{name}' was deleted"
+    )
+    return (translated(text, name=ground.name),)
 
 
 def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
@@ -197,7 +200,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole = {"marks": True, "carve": False, "hard_grounds": (), **inputs}
+    whole = {"marks": True, "carve": False, "hard_grounds": (), "regions": (), **inputs}
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
@@ -248,6 +251,8 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
     except InputError as error:
         return str(error)
     parts += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in names]
+    if any(ground_slots.naming(ground)):
+        parts += [f"{zlib.crc32(ground_slots.of_faces(ground_mesh.mesh_of(ground)).data):08x}"]
     return input_hashes.joined([*parts, input_hashes.of_weights(ground, names)])
 
 

@@ -21,6 +21,7 @@ from ..ground import baked_ground
 from ..operators import baked_steps
 from ..operators.baked_steps import BakedStep
 from ..state import state
+from ..translation import translated
 from . import overlay
 from .step_editing import EditJob, OnSteps, changed, toggle
 
@@ -80,7 +81,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         state.picking = True
         manager: Any = context.window_manager
         manager.modal_handler_add(self)
-        context.workspace.status_text_set(_HINT)
+        context.workspace.status_text_set(translated(_HINT))
         _redraw()
         return {"RUNNING_MODAL"}
 

@@ -35,6 +35,7 @@ from ..operators import baked_steps, show_prints
 from ..operators.baked_steps import BakedStep
 from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..reading import analysis
+from ..translation import translated
 
 
 class OnSteps(OnBake):
@@ -44,7 +45,9 @@ class OnSteps(OnBake):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is a bake, and neither another one nor live mode is at work."""
         if session.current().is_baking or live.is_on():
-            cls.poll_message_set("A bake is running, or live mode is on: wait, or press Keep or Discard first")
+            cls.poll_message_set(
+                translated("A bake is running, or live mode is on: wait, or press Keep or Discard first")
+            )
             return False
         return super().poll(context)
 

@@ -48,8 +48,9 @@ class Meeting:
 
 @dataclass(frozen=True)
 class CarriedMass:
-    """Masses that soles have carried [kg]: what was picked up is the sum of the others."""
+    """Masses that soles have carried [kg]: what they brought and picked up is the sum of the others."""
 
+    brought: float = 0.0
     picked_up: float = 0.0
     left_behind: float = 0.0
     shed: float = 0.0
@@ -89,8 +90,10 @@ def share_left(pressure: Any, carried: CarriedFilm, slid: float = 0.0) -> Any:
     return np.minimum(carried.left * -np.expm1(-np.asarray(pressure) / PRESSING) * (1.0 + min(slid, 1.0)), 1.0)
 
 
-def carry(meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array) -> tuple[list[Array], CarriedMass]:
-    """The film of a sole that starts clean at each of its meetings with the ground, in their order.
+def carry(
+    meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array, brought: float = 0.0
+) -> tuple[list[Array], CarriedMass]:
+    """The film of a sole at each of its meetings with the ground, in their order.
 
     Parameters
     ----------
@@ -98,6 +101,8 @@ def carry(meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array) -> tu
     carried : CarriedFilm
     areas : (4,) float array
         Of the sole's zones [m²].
+    brought : float
+        Film that it starts with, over the thickest: 0 for a clean sole.
 
     Returns
     -------
@@ -105,7 +110,8 @@ def carry(meetings: Iterable[Meeting], carried: CarriedFilm, areas: Array) -> tu
         Film that each meeting takes its share of [kg/m²]: 0 where it is a trace, and on soft ground.
     CarriedMass
     """
-    now, booked, giving = np.zeros(len(ZONES)), CarriedMass(), []
+    now, giving = np.full(len(ZONES), brought * carried.most), []
+    booked = CarriedMass(brought=float(now @ areas))
     for meeting in meetings:
         if meeting.shares is None:
             more = taken_up(now, carried) - now

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -52,6 +52,8 @@ class Marks:
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
     carried : CarriedMass
+    surface : str
+        What they are of.
     """
 
     position: Array
@@ -63,6 +65,7 @@ class Marks:
     tread: Array
     step: NDArray[np.intp]
     carried: CarriedMass = field(default_factory=CarriedMass)
+    surface: str = ""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,7 @@ def marks_of(
     surface: str,
     shed: Mapping[int, float] = MappingProxyType({}),
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
+    brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or the ground does not stick.
 
@@ -94,10 +98,13 @@ def marks_of(
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     terrain : Terrain
     surface : str
+        What soles take up, of all that the ground is made of.
     shed : mapping of int to float, optional
         Mass that each step sheds in the air, by its number [kg].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
+    brought : mapping of str to float, optional
+        Film on the soles of a character as the shot starts, over the thickest, by its name.
     """
     carried = surfaces.find(surface).carried
     if carried is None or not isinstance(terrain, HardOnSoft):
@@ -109,9 +116,11 @@ def marks_of(
             yield
             if motion.sole.prop is not None:
                 continue
-            soft = list(_soft_meetings(character, index, steps, shed))
+            sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
+            soft = list(_soft_meetings(character, index, sticky, shed))
             hard = character.contacts.hard
-            if not soft or hard is None or not hard[:, index].any():
+            dirty = brought.get(character.motion.name, 0.0)
+            if not (soft or dirty) or hard is None or not hard[:, index].any():
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
@@ -119,7 +128,7 @@ def marks_of(
                 contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
                 yield
             meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
-            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area))
+            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
             booked += of_sole
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
             for contact in contacts:
@@ -128,7 +137,7 @@ def marks_of(
                     depth = treads.get((character.motion.name, motion.sole.name), 0.0)
                     parts.append(_mark(grid, contact, film, count, depth))
                     count += 1
-    return _joined(parts, booked)
+    return replace(_joined(parts, booked), surface=surface)
 
 
 def _soft_meetings(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BakeError
-from ..ground.material import GroundMaterial
+from ..ground.soft_ground import SoftGround
 from ..record.footprints import QUANTUM, Footprint
 
 Array = NDArray[np.float64]
@@ -17,19 +17,23 @@ RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (docs/model.md section 4)."""
 
 
-def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
+def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: Array | None = None) -> None:
     """Raise BakeError if a footprint breaks an invariant of docs/model.md section 4.
 
     Parameters
     ----------
     footprints : sequence of Footprint
-    material : GroundMaterial
+    ground : SoftGround
+        That they were baked on. Where a print lies on several materials, its rim's share lies between theirs.
     factors : (V, 3) float array, optional
         What is painted on the ground: there, the rim's share lies between the least and the largest painted.
     """
     depth, rim = np.ones((2, 2)) if factors is None else (np.append(column, 1.0) for column in factors[:, 1:].T)
-    least, most = np.clip(2.0 * material.poisson_ratio * np.array([rim.min(), rim.max()]), 0.0, 1.0)
     for footprint in footprints:
+        materials = ground.materials_under(footprint.window, footprint.cell_size)
+        ratios = [material.poisson_ratio for material in materials]
+        least, most = np.clip(2.0 * np.array([min(ratios), max(ratios)]) * np.array([rim.min(), rim.max()]), 0.0, 1.0)
+        deepest = max(material.deepest for material in materials)
         raised = footprint.rim_m3 + footprint.unplaced_rim_m3
         rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
         low, high = least * footprint.compressed_m3, most * footprint.compressed_m3
@@ -39,7 +43,7 @@ def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, fac
                 f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
             )
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
-        if footprint.max_depth_m > (material.deepest * depth.max() + fallen) * (1 + 1e-9):
+        if footprint.max_depth_m > (deepest * depth.max() + fallen) * (1 + 1e-9):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
                 "was written. Please report this as a bug."

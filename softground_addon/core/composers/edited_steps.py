@@ -89,11 +89,11 @@ class EditedSteps:
 
     def __init__(self, footprints: Sequence[Footprint], ground: SoftGround, cell_size: float) -> None:
         self._footprints, self._ground, self._cell_size = footprints, ground, cell_size
-        self._undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self._undisturbed = UndisturbedCells(ground, cell_size)
         self._cells = GroundCells(ground, self._undisturbed)
         self._weather_reach = int(ground.weathering.reach / cell_size) if ground.weathering else 0
         """How many cells around a step what weather leaves there depends on."""
-        sliding = int(SLIDING / cell_size) if ground.material.repose_angle else 0
+        sliding = int(SLIDING / cell_size) if ground.slides else 0
         self._margin = max(sliding, self._weather_reach)
         self._feet = feet(footprints)
         self._points: dict[tuple[int | MeshSole, float], SolePoints] = {}
@@ -221,14 +221,14 @@ class EditedSteps:
 
     def _read_by(self, footprint: Footprint) -> Keys:
         """The cells that a print depends on."""
-        if self._ground.weathering or self._ground.material.repose_angle:
+        if self._ground.weathering or self._ground.slides:
             window = footprint.window.expanded(self._weather_reach)
             return keys_of_cells(window, np.arange(window.cells))
         return keys_of_cells(footprint.window, footprint.contact_cells[:])
 
     def _changed_cells(self, number: int, after: Footprint | None) -> Keys:
         """Cells in which the print of a step differs visibly from that of the bake."""
-        either = self._ground.material.repose_angle or self._ground.weathering
+        either = self._ground.slides or self._ground.weathering
         before, window = self._before(number), self._baked(number).window
         window = window.union(after.window) if after else window
         difference = np.zeros((2 if either else 1, window.rows, window.columns))

@@ -82,7 +82,7 @@ class Playhead:
         pressed: HeightField | None = None,
         undisturbed: UndisturbedCells | None = None,
     ) -> None:
-        self.undisturbed = undisturbed or UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self.undisturbed = undisturbed or UndisturbedCells(ground, cell_size)
         self.ground = pressed.copy() if pressed else HeightField(cell_size)
         self.contact = SparseGrid(cell_size, channels=1, fill=-np.inf)
         self._loads, self._soft_ground, self._before = tuple(loads), ground, self.ground.copy()

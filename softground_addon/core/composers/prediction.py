@@ -99,7 +99,8 @@ class ShotContacts:
 
 @sliced
 def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Slices[ShotContacts]:
-    """Every contact of the characters, pressed; each character treads on its own prints only, and no weather on them.
+    """Every contact of the characters, pressed as if the ground had no regions; each character treads on its own prints
+    only, and no weather on them.
 
     Parameters
     ----------
@@ -109,8 +110,9 @@ def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_s
         Side of a cell of the bake [m].
     """
     contacts: list[_Contact] = []
+    ground = replace(ground, regions=None)
     for number, character in enumerate(loads):
-        cells = UndisturbedCells(ground.terrain, ground.variation, max(cell_size, _coarsest(character)))
+        cells = UndisturbedCells(ground, max(cell_size, _coarsest(character)))
         contacts += sorted(_laid_out(character, number, cells), key=lambda contact: contact.source.first)
         yield
     return (yield from _sampled(contacts, replace(ground, weathering=None)))

@@ -95,7 +95,7 @@ def press_shot(
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
         footprints, forces = yield from _simulate(wanted, loads, ground)
-    check_volumes(footprints, wanted.material, factors)
+    check_volumes(footprints, ground, factors)
     yield None
     left = yield from _edited(wanted, ground, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, left, asked)

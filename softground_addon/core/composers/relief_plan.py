@@ -138,7 +138,8 @@ def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> Reli
     strength, tread = numbers
     if not strength > 0:
         return None
-    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD)
+    looks = {step.surface: amounts.of_look(step.surface) for step in footprints if step.surface}
+    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD, looks)
 
 
 def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tuple[str, str], SoleTread]:

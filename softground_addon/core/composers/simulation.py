@@ -104,7 +104,7 @@ class Simulation:
 
     def __init__(self, ground: SoftGround, state: HeightField, undisturbed: UndisturbedCells | None = None) -> None:
         if undisturbed is None:
-            undisturbed = UndisturbedCells(ground.terrain, ground.variation, state.cell_size)
+            undisturbed = UndisturbedCells(ground, state.cell_size)
         self._solver = GroundSolver(ground, state, undisturbed)
 
     def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:

@@ -149,7 +149,8 @@ def sources(
             throw_of_step.placed(step.baked, step.left, step.edit)
             for throw_of_step in of_steps.get(step.index % count, ())
         ]
-        volumes = [_volume(way, step.left, surfaces.find(surface).thrown, gravity) for way in ways]
+        matter = surfaces.find(step.left.surface or surface).thrown
+        volumes = [_volume(way, step.left, matter, gravity) for way in ways]
         scale = min(1.0, step.left.rim_m3 / max(sum(volumes), 1e-300))
         of_all += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
     return of_all
@@ -198,7 +199,9 @@ def throw(
     kinds = 2 * sum(source.throw.kind != ThrowKind.SHED for source in throwing)  # pieces and grains
     parts = []
     for source in throwing:
-        parts.append(_pieces(source, surfaces.find(surface).thrown, gravity, ALL_PIECES // max(kinds, 1)))
+        left = source.step.left
+        matter = surfaces.find((left and left.surface) or surface).thrown
+        parts.append(_pieces(source, matter, gravity, ALL_PIECES // max(kinds, 1)))
         yield
     return (yield from _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None))
 

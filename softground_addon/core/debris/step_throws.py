@@ -61,7 +61,8 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
             yield
             number = _footprint_of(character, phase, footprints)
             if number is not None:
-                throws += _throws(character, phase, number, surfaces.find(surface).thrown, sliding)
+                of_step = surfaces.find(footprints[number].surface or surface)
+                throws += _throws(character, phase, number, of_step.thrown, sliding)
     return throws
 
 

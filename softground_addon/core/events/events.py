@@ -119,19 +119,21 @@ class _Steps:
     """The footprints of each sole, by time."""
 
     def __init__(self, footprints: Sequence[Footprint]) -> None:
-        self._of: dict[tuple[str, str], list[tuple[float, float, str, float, float]]] = {}
+        self._of: dict[tuple[str, str], list[tuple[float, float, str, float, float, str]]] = {}
         for step in footprints:
-            row = (step.start_frame, step.end_frame, step_id(step), step.max_depth_m, step.area_m2)
+            row = (step.start_frame, step.end_frame, step_id(step), step.max_depth_m, step.area_m2, step.surface)
             self._of.setdefault((step.character, step.sole), []).append(row)
 
-    def at(self, character: str, sole: str, first: float, last: float) -> tuple[str, float, float]:
-        """Id, depth [m] and area [m²] of the print that a phase from one frame to another shares most time with."""
+    def at(self, character: str, sole: str, first: float, last: float) -> tuple[str, float, float, str]:
+        """Id, depth [m], area [m²] and, of regions, surface of the print that shares most time with a phase from one
+        frame to another.
+        """
         rows = self._of.get((character, sole), [])
         shared = [min(last, end) - max(first, start) for start, end, *_ in rows]
         if not shared or max(shared) < -1.0:
-            return "", 0.0, 0.0
-        _, _, name, depth, area = rows[int(np.argmax(shared))]
-        return name, depth, area
+            return "", 0.0, 0.0, ""
+        _, _, name, depth, area, surface = rows[int(np.argmax(shared))]
+        return name, depth, area, surface
 
 
 class _Sole:
@@ -157,7 +159,9 @@ def _row(
     landing, force = phase.kind in LANDINGS, over_time.force[span]
     length = over_time.until(phase) - phase.moment if landing else phase.last - phase.first
     frames = motion.frames[phase.first], motion.frames[min(phase.last, len(motion.frames)) - 1]
-    step, depth, area = steps.at(motion.name, sole.name, *frames) if phase.kind != "scuff" else ("", 0.0, 0.0)
+    step, depth, area, its_surface = steps.at(motion.name, sole.name, *frames)
+    if phase.kind == "scuff":
+        step, depth, area = "", 0.0, 0.0
     peak = float(force.max(initial=0.0))
     return {
         "time_s": _rounded((frame - first_frame) / motion.frame_rate),
@@ -169,7 +173,7 @@ def _row(
         "side": sole.side,
         "position": [_rounded(value, 5) for value in phases.place_of(loads, phase.sole, at)],
         "normal": [_rounded(value, 5) for value in loads.contacts.normal[at, phase.sole]],
-        "surface": surface,
+        "surface": its_surface or surface,
         "peak_force_n": _rounded(peak, 2),
         "peak_bw": _rounded(peak / (motion.mass * motion.gravity), 4),
         "impulse_ns": _rounded(float(force.sum()) * motion.time_step, 3),
@@ -188,6 +192,7 @@ def _moved(row: Event, step: EditableStep) -> Event:
     assert after is not None
     if step.thrown:
         row = row | {"thrown_kg": _rounded(step.thrown.get(row["phase"], 0.0) * surfaces.find(row["surface"]).density)}
+    row = row | {"surface": after.surface or row["surface"]}
     later = after.start_frame - before.start_frame
     if later and before.pressed_by:
         seconds = later / before.load_spacing * before.pressed_by.time_step

@@ -116,7 +116,7 @@ def steps_of(
         compacted = np.stack([seconds(ends - step.frame_step), seconds(ends), volumes], axis=1)
         time, force = seconds(step.load_frames), np.asarray(step.load_n, float)
         marks = moment(struck.get(name)), moment(lifted.get(name))
-        heard.append(SoundStep(name, surface, *marks, time, force, compacted, step.max_depth_m))
+        heard.append(SoundStep(name, step.surface or surface, *marks, time, force, compacted, step.max_depth_m))
     return heard
 
 

@@ -143,6 +143,8 @@ def _step(editable: EditableStep) -> dict[str, Any]:
         "compressed_m3": float(footprint.compressed_m3),
         "rim_m3": float(footprint.rim_m3),
     }
+    if footprint.surface:
+        step["surface"] = footprint.surface
     if editable.edit != UNCHANGED or editable.is_copy:
         step["edit"] = edit_as_json(editable.edit)
     if editable.left is None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .heightfield import HeightField, Terrain
 from .material import STANDARD_GRAVITY, GroundMaterial, Pressure
+from .regions import Regions
 from .sparse_grid import SparseGrid, Window
 from .variation import Variation
 
@@ -80,6 +81,8 @@ class SoftGround:
         What steps find of earlier ones; None where these stay as they are.
     gravity : float
         [m/s²].
+    regions : Regions or None
+        Where it is made of something else than `material`; None where it is all the same.
     """
 
     terrain: Terrain
@@ -88,3 +91,16 @@ class SoftGround:
     variation: Variation | None = None
     weathering: Weathering | None = None
     gravity: float = STANDARD_GRAVITY
+    regions: Regions | None = None
+
+    @property
+    def slides(self) -> bool:
+        """True if it has an angle of repose somewhere."""
+        kinds = self.regions.kinds if self.regions else ()
+        return any(material.repose_angle for material in (self.material, *(kind.material for kind in kinds)))
+
+    def materials_under(self, window: Window, cell_size: float) -> list[GroundMaterial]:
+        """What it is made of under a window of cells of that side [m]."""
+        if self.regions is None:
+            return [self.material]
+        return [self.regions.kinds[number].material for number in self.regions.under(window, window, cell_size)[0]]

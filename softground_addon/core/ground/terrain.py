@@ -77,6 +77,7 @@ class MeshTerrain:
         bounds: Array | None = None,
         values: Array | None = None,
         *,
+        of_faces: Array | None = None,
         name: str = "The ground",
     ) -> Slices[MeshTerrain]:
         """Bin the triangles of a mesh.
@@ -92,6 +93,8 @@ class MeshTerrain:
             Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
         values : (V, C) float array, optional
             What is said of the vertices, to be interpolated between them.
+        of_faces : (T,) array, optional
+            What is said of the triangles, as the last of the values.
         name : str
             For messages.
 
@@ -104,7 +107,8 @@ class MeshTerrain:
             place = vertices[:, :2]
             sides = (place < bounds[0]) @ (1, 2) + (place > bounds[1]) @ (4, 8)  # one bit for each that it is beyond
             a, b, c = sides[triangles].T
-            triangles = triangles[a & b & c == 0]
+            inside = a & b & c == 0
+            triangles, of_faces = triangles[inside], None if of_faces is None else of_faces[inside]
             yield
         corners = vertices[triangles].astype(np.float64, copy=False)
         yield
@@ -122,6 +126,9 @@ class MeshTerrain:
             raise InputError(f"{name} has no face under the character's path to stand on: move it under the feet.")
         bins = yield from _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
+        if of_faces is not None:
+            repeated = np.broadcast_to(np.asarray(of_faces, float)[upward, None, None], (len(corners), 3, 1))
+            of_corners = np.concatenate([of_corners, repeated], axis=2)
         return MeshTerrain(corners, *bins, of_corners)
 
     def heights(self, x: Array, y: Array, limit: Array | None = None) -> Array:
@@ -148,13 +155,28 @@ class MeshTerrain:
 
     def interpolated(self, x: Array, y: Array) -> Array:
         """The values of the highest upward-facing surface at each place, (C, ...); NaN where there is none."""
-        hits = self._surfaces(np.ravel(x), np.ravel(y))
-        order = np.argsort(hits.z, kind="stable")  # the highest is written last
-        a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
-        u, v = hits.u[order, None], hits.v[order, None]
+        across, along = np.ravel(x), np.ravel(y)
         values = np.full((np.size(x), self.values.shape[2]), np.nan)
-        values[hits.point[order]] = a + u * (b - a) + v * (c - a)
+        for first in range(0, len(values), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            order = np.argsort(hits.z, kind="stable")  # the highest is written last
+            a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
+            u, v = hits.u[order, None], hits.v[order, None]
+            values[part][hits.point[order]] = a + u * (b - a) + v * (c - a)
         return values.T.reshape(-1, *np.shape(x))
+
+    def within(self, low: Array, high: Array) -> Indices:
+        """The triangles whose bounding boxes meet that from low to high in the plane, (2,) each [m]."""
+        from_bin, to_bin = (
+            np.clip(np.floor((corner - self.origin) / self.bin_size), 0, self.shape - 1).astype(np.intp)
+            for corner in (low, high)
+        )
+        rows = np.arange(from_bin[1], to_bin[1] + 1) * self.shape[0]
+        pair, within = enumerated(self.first[rows + to_bin[0] + 1] - self.first[rows + from_bin[0]])
+        near: Indices = self.members[self.first[rows + from_bin[0]][pair] + within]
+        place = self.corners[near, :, :2]
+        return near[((place.min(axis=1) <= high) & (place.max(axis=1) >= low)).all(axis=1)]
 
     def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Return whether no second upward-facing surface lies below the highest one, for each place."""

@@ -34,14 +34,14 @@ class PaintedSurface:
     Attributes
     ----------
     surface : MeshTerrain
-        With the factors as its values, in the order of `CHANNELS`.
+        With the factors as its first values, in the order of `CHANNELS`.
     """
 
     surface: MeshTerrain
 
     def factors(self, x: Array, y: Array) -> Array:
         """Factors at world positions [m], (3, ...); NaN off the surface."""
-        return self.surface.interpolated(x, y)
+        return self.surface.interpolated(x, y)[: len(CHANNELS)]
 
 
 class Factors(NamedTuple):

@@ -7,6 +7,7 @@ sqrt(gravity·leg length), so that the same numbers serve a mouse and a giant, m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -45,6 +46,8 @@ LANDED_HEIGHT = 0.01
 """A sole has landed when one of its landmarks is this near to where it will stand, in leg lengths."""
 REST_SPEED = 0.15
 """A sole slower than this may be standing: such samples tell the float, in sqrt(gravity·leg length)."""
+BELT_SHARE = 0.12
+"""Speed of a belt, where that is less than `REST_SPEED`, as a part of the fastest speed of the soles on it."""
 SOLID_FLOAT_LIMIT = 0.03
 """The same for what is not a foot: hands, knees and canes come near the ground without touching it, in leg lengths."""
 FLOAT_PERCENTILE = 10.0
@@ -139,8 +142,10 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contact
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
     seen = _seen_on_skin(motion, terrain, tracks)
-    # Where a whole body travels, its speed tells more finely than its skin when a foot that swings has left.
-    if seen is not None and (drift.any() or not motion.joints):
+    # Where a whole body travels, its speed tells more finely than its skin when a foot that swings has left. A small or
+    # slow one on the spot moves too slowly for that.
+    on_the_spot = drift.any() or (motion.skin is not None and motion.skin.on_the_spot)
+    if seen is not None and (on_the_spot or not motion.joints):
         return seen
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
     of_soles = [
@@ -296,7 +301,21 @@ def _ground_drift(tracks: list[_Track], motion: CharacterMotion) -> Array:
     """
     low = [track.velocity[track.clearance < _low(track.clearance, motion.leg_length)] for track in tracks]
     drift = np.median(np.concatenate(low), axis=0) * (1.0, 1.0, 0.0) if any(map(len, low)) else np.zeros(3)
-    return drift * (np.linalg.norm(drift) > REST_SPEED * motion.froude_speed)
+    return drift * (np.linalg.norm(drift) > slowest_belt([track.velocity for track in tracks], motion))
+
+
+def slowest_belt(velocities: Sequence[Array], motion: CharacterMotion) -> float:
+    """Speed below which soles that slide while they stand are on no belt [m/s].
+
+    Parameters
+    ----------
+    velocities : sequence of (N, 2 or 3) float array
+        Of each sole [m/s].
+    motion : CharacterMotion
+    """
+    fastest = max(float(np.percentile(np.linalg.norm(velocity[:, :2], axis=1), 95)) for velocity in velocities)
+    unit = motion.froude_speed
+    return min(REST_SPEED * unit, max(BELT_SHARE * fastest, SLOWEST_TOUCH * unit))
 
 
 def _low(clearance: Array, leg_length: float) -> float:

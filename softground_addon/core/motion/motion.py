@@ -69,6 +69,8 @@ class LowSkin:
         Of the body [m].
     mass : float
         That its volume suggests [kg], 0 where it suggests none.
+    on_the_spot : bool
+        True if what rests slides back, as on a belt.
     """
 
     frames: Array
@@ -77,6 +79,7 @@ class LowSkin:
     calm: float
     height: float
     mass: float = 0.0
+    on_the_spot: bool = False
 
 
 @dataclass(frozen=True)

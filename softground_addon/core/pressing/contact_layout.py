@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,8 @@ from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole
 from ..record.contact_steps import Steps
 from .ground_cells import GroundCells, Imprints, Timing
-from .rim import lean_of_landing, leaning
+from .kind_shares import across
+from .rim import in_contact, lean_of_landing, leaning, rim_weights, whole_reach
 
 Array = NDArray[np.float64]
 
@@ -72,19 +74,37 @@ class ContactLayout(ABC):
         sinkage : float
             How far the ground has given way under the sole's lowest point by then [m].
         """
+        widest = cells.widest
         per_frame = timing.steps_per_frame
         last = min(self.end, end + per_frame * max(0, STEPS_AT_ONCE // per_frame - 1))
-        allowed = LARGEST_SPREAD * self._window(start, start + 1, cells).cells
-        window = self._window(start, last, cells)
+        allowed = LARGEST_SPREAD * self._window(start, start + 1, widest).cells
+        window = self._window(start, last, widest)
         most = CELLS_AT_ONCE // self._parts(start, last, cells)
         while last > end and (window.cells > allowed or window.cells * (last - start) > most):
             last = end + (last - end) // (2 * per_frame) * per_frame
-            window = self._window(start, last, cells)
-        return self._deeper(self._lay_out(start, last, window, cells, timing.step, sinkage), cells)
+            window = self._window(start, last, widest)
+        numbers, shares = [0], None
+        if regions := cells.ground.regions:
+            sole = window.expanded(-whole_reach(widest.rim_reach))
+            numbers, shares = regions.under(sole, window, cells.cell_size)
+        kinds = [cells.kinds[number] for number in numbers]
+        if len(kinds) == 1 and kinds[0] is not widest:
+            window = self._window(start, last, kinds[0])
+        of_kinds = [self._deeper(self._lay_out(start, last, window, c, timing.step, sinkage), c) for c in kinds]
+        return of_kinds[0] if shares is None else self._across(of_kinds, shares, kinds)
+
+    def _across(self, of_kinds: Sequence[Imprints], shares: Array, kinds: Sequence[GroundCells]) -> Imprints:
+        """The imprints across borders between kinds of ground, whose shares in each cell are (K, rows, columns)."""
+        laid, most = across(of_kinds, shares)
+        cells, bias = kinds[most], kinds[most].material.rim_bias
+        contact, lean = in_contact(laid.coverage), self.lean[laid.first - self.first : laid.end - self.first]
+        toward = bias * lean.repeat(laid.parts, axis=0) if bias else None
+        rim = rim_weights(laid.coverage, contact, cells.rim_reach, cells.surface(laid.window).bears, toward)
+        return replace(laid, contact=contact, rim=rim)
 
     def window(self, cells: GroundCells) -> Window:
         """The cells that the whole contact may change, but for ground that slides."""
-        return self._window(self.first, self.end, cells)
+        return self._window(self.first, self.end, cells.widest)
 
     def _deeper(self, imprints: Imprints, cells: GroundCells) -> Imprints:
         """The imprints with `strength` times their compression, as far as the ground gives way."""

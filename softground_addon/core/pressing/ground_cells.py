@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.hard_ground import bare
-from ..ground.heightfield import Surface, Terrain, TerrainTiles
+from ..ground.heightfield import Surface, TerrainTiles
+from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
-from ..ground.variation import Factors, Variation, VariationTiles
+from ..ground.variation import Factors, VariationTiles
 
 Array = NDArray[np.float64]
 
@@ -41,17 +42,16 @@ class UndisturbedCells:
 
     Parameters
     ----------
-    terrain : Terrain
-    variation : Variation or None
+    ground : SoftGround
     cell_size : float
         Side of a cell [m].
     """
 
-    def __init__(self, terrain: Terrain, variation: Variation | None, cell_size: float) -> None:
+    def __init__(self, ground: SoftGround, cell_size: float) -> None:
         self.cell_size = cell_size
-        self._terrain = bare(terrain)
+        self._terrain = bare(ground.terrain)
         self._tiles: dict[int, TerrainTiles] = {}
-        self._variation = VariationTiles(variation, cell_size) if variation else None
+        self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
 
     def surface(self, window: Window, divisions: int = 1) -> Surface:
         """The ground under a window, its cells divided in so many parts along each side."""
@@ -82,12 +82,29 @@ class GroundCells:
         See `UndisturbedCells`.
     material : GroundMaterial
         What the ground is made of, under its gravity.
+    made_of : str
+        Name of its surface, where a ground has regions.
     """
 
-    def __init__(self, ground: SoftGround, undisturbed: UndisturbedCells) -> None:
+    def __init__(self, ground: SoftGround, undisturbed: UndisturbedCells, made_of: str = "") -> None:
         self.ground, self.undisturbed, self.cell_size = ground, undisturbed, undisturbed.cell_size
         self.surface, self.factors = undisturbed.surface, undisturbed.factors
-        self.material = ground.material.under(ground.gravity)
+        self.material, self.made_of = ground.material.under(ground.gravity), made_of
+
+    @cached_property
+    def kinds(self) -> tuple[GroundCells, ...]:
+        """The same cells as if the ground were all of each of its kinds."""
+        if not self.ground.regions:
+            return (self,)
+        return tuple(
+            GroundCells(replace(self.ground, material=kind.material, regions=None), self.undisturbed, kind.surface)
+            for kind in self.ground.regions.kinds
+        )
+
+    @cached_property
+    def widest(self) -> GroundCells:
+        """Those of the kind whose rims reach furthest."""
+        return max(self.kinds, key=lambda kind: kind.rim_reach)
 
     @property
     def rim_reach(self) -> float:
@@ -135,7 +152,7 @@ class Imprints:
         Steps at which there is any pressure on the ground.
     target : (N,) or (N, rows, columns) float array
         Compression that the stress leads to [m]; of each cell where the pressure or the ground varies.
-    rate : (N,) float array
+    rate : (N,) or (N, rows, columns) float array
         From `deformation.compression_rate`.
     holds : (N,) or (N, rows, columns) bool array, or None
         Where an unbroken crust carries the stress.
@@ -144,6 +161,10 @@ class Imprints:
     reached : float
         How far the ground has given way under the sole's lowest point after the last step [m].
     loads : Loads
+    material : GroundMaterial
+        That bears.
+    made_of : str
+        See `GroundCells`.
     """
 
     first: int
@@ -159,6 +180,8 @@ class Imprints:
     factors: Factors | None
     reached: float
     loads: Loads
+    material: GroundMaterial
+    made_of: str = ""
 
     @property
     def end(self) -> int:

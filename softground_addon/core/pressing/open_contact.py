@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..ground.heightfield import Surface
+from ..ground.material import GroundMaterial
 from ..ground.sparse_grid import SparseGrid
 from ..record.contact_steps import ContactSteps
 from ..record.footprints import Footprint, FootprintRecorder
@@ -32,6 +33,8 @@ class OpenContact:
         None until something is pressed.
     compression : SparseGrid or None
         What it compressed itself [m], kept where the ground hardens.
+    material : GroundMaterial or None
+        That bore it last.
     met : Imprints or None
         Those of which it was last seen what weather had left there.
     surface : Surface or None
@@ -52,12 +55,14 @@ class OpenContact:
         self.layout, self.earlier, self.pressed_by = layout, earlier, pressed_by
         self.recorder: FootprintRecorder | None = None
         self.compression: SparseGrid | None = None
+        self.material: GroundMaterial | None = None
         self.met: Imprints | None = None
         self.surface: Surface | None = None
         self.level = 0.0
         self.compressed = self.raised = self.unplaced = 0.0
         self._load = self._area = self._sinkage = 0.0
         self._moment = np.zeros(3)
+        self._borne: dict[str, float] = {}
         self._imprints: Imprints | None = None
         self._laid_out = laid_out
 
@@ -83,7 +88,9 @@ class OpenContact:
     def add_loads(self, imprints: Imprints, first: int, last: int) -> None:
         """Add the loads of some of the imprints, which were pressed."""
         force = imprints.loads.force[first:last]
-        self._load += float(force.sum())
+        load = float(force.sum())
+        self._load += load
+        self._borne[imprints.made_of] = self._borne.get(imprints.made_of, 0.0) + load
         self._moment += force @ imprints.loads.middle[first:last]
         self._area = max(self._area, float(imprints.loads.area[first:last].max(initial=0.0, where=force > 0)))
 
@@ -108,4 +115,5 @@ class OpenContact:
             load_frames=frames,
             load_n=layout.force,
             pressed_by=self.pressed_by,
+            surface=max(self._borne, key=lambda surface: self._borne[surface]),
         )

@@ -123,6 +123,8 @@ class PropLayout(ContactLayout):
             factors,
             float(reached[-1]),
             Loads(np.where(pressing, force, 0.0), area, middle),
+            material,
+            cells.made_of,
         )
 
     def _toward(self, step: int) -> Array:

@@ -122,6 +122,8 @@ class SoleLayout(ContactLayout):
                 printing.sum(axis=1),
                 self._middle(poses, over_ground, printing),
             ),
+            material,
+            cells.made_of,
         )
 
     def _plate(self, cells: GroundCells, step: float, landing_speed: float) -> Plate | None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import HeightField
-from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
 from ..record.footprints import FootprintRecorder, quantised
@@ -48,11 +47,6 @@ class GroundSolver:
         """What weather does between contacts, where steps feel it."""
         if ground.weathering:
             self.weathered = WeatheredCells(ground.weathering, state.cell_size)
-
-    @property
-    def material(self) -> GroundMaterial:
-        """Material of the ground."""
-        return self.cells.material
 
     @property
     def cell_size(self) -> float:
@@ -110,15 +104,16 @@ class GroundSolver:
 
     def _settle(self, contact: OpenContact, frame: float) -> tuple[Window, ...]:
         """Let slide what a contact that has ended left too steep; where the ground may have changed by that."""
-        if not self.material.repose_angle or contact.recorder is None:
+        angle = contact.material.repose_angle if contact.material else 0.0
+        if not angle or contact.recorder is None:
             return ()
-        window = self._around(contact.recorder.window)
+        window = self._around(contact.recorder.window, angle)
         state = self.state.read(window)
         before = quantised(state)
         lowered = self._lowered(window, contact)
         state[0] += lowered
         terrain, bears = self._undisturbed(contact, window)
-        state[1] = self._slid(state, window, terrain, ~bears, SWEEPS_TO_REST)
+        state[1] = self._slid(state, window, terrain, ~bears, angle, SWEEPS_TO_REST)
         state[0] -= lowered
         change = quantised(state) - before
         if not change.any():
@@ -135,8 +130,8 @@ class GroundSolver:
         if not len(steps):
             return []
         self._meet(contact, imprints, frame, timing)
-        material = self.material
-        window = self._around(imprints.window) if material.repose_angle else imprints.window
+        material = contact.material = imprints.material
+        window = self._around(imprints.window, material.repose_angle) if material.repose_angle else imprints.window
         whole = self.state.read(window)
         before = quantised(whole)
         inside = window.slices(imprints.window)
@@ -170,7 +165,7 @@ class GroundSolver:
                 terrain, bears = self._undisturbed(contact, window)
                 fixed = ~bears
                 fixed[inside] |= imprints.contact[step]
-                whole[1] = self._slid(whole, window, terrain, fixed, SWEEPS_PER_SLIDE)
+                whole[1] = self._slid(whole, window, terrain, fixed, material.repose_angle, SWEEPS_PER_SLIDE)
         if contact.compression is not None and compacted is not None:
             contact.compression.write(imprints.window, (state[0] - compacted)[None])
         if self.weathered:
@@ -226,10 +221,10 @@ class GroundSolver:
             contact.compression = SparseGrid(self.cell_size, channels=1)
         return np.maximum(state[0] - contact.compression.read(window)[0], 0.0)
 
-    def _around(self, window: Window) -> Window:
+    def _around(self, window: Window, angle: float) -> Window:
         """A window with the ground around it that may slide with it."""
         compression, rim = self.state.read(window)
-        return window.expanded(slide_reach(rim, compression, self.material.repose_angle, self.cell_size))
+        return window.expanded(slide_reach(rim, compression, angle, self.cell_size))
 
     def _undisturbed(self, contact: OpenContact, window: Window) -> tuple[Array, Mask]:
         """Heights of the undisturbed ground, and what of it bears, over a window around a contact."""
@@ -238,13 +233,13 @@ class GroundSolver:
         inside = contact.surface.window.slices(window)
         return contact.surface.heights[inside], contact.surface.bears[inside]
 
-    def _slid(self, state: Array, window: Window, terrain: Array, fixed: Mask, sweeps: int) -> Array:
+    def _slid(self, state: Array, window: Window, terrain: Array, fixed: Mask, angle: float, sweeps: int) -> Array:
         """The rim of a window after what is too steep has slid down."""
         return slid(
             state[1],
             state[0],
             terrain,
-            angle=self.material.repose_angle,
+            angle=angle,
             cell_size=self.cell_size,
             fixed=fixed,
             corner=(window.row, window.column),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.sparse_grid import Window
+from ..ground.surfaces import SURFACES
 from . import contact_arrays
 from .contact_steps import ContactSteps
 from .footprints import Changes, Footprint
@@ -96,7 +97,10 @@ def to_parts(
         `numbers`, `position` and `window` are of all footprints; so is each series, with the number of values of each
         footprint in `<series>.count`.
     """
-    names = [{key: getattr(footprint, key) for key in _TEXTS} for footprint in footprints]
+    names = [
+        {key: getattr(footprint, key) for key in _TEXTS} | ({"surface": footprint.surface} if footprint.surface else {})
+        for footprint in footprints
+    ]
     numbers = [[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]
     arrays = {"numbers": Parts.whole(numbers, np.float64)}
     for key, (_, kind) in _VECTORS.items():
@@ -169,7 +173,9 @@ def _footprint(
     for quantity in ("compression", "rim"):
         content[quantity] = Changes(**{field.name: values[f"{quantity}.{field.name}"] for field in fields(Changes)})
     content |= {"window": Window(*values["window"].tolist()), "position": values["position"]}
-    return Footprint(pressed_by=pressed_by, **content)
+    if (surface := name.get("surface", "")) and surface not in SURFACES:
+        raise ValueError(f"there is no surface {surface!r}")
+    return Footprint(pressed_by=pressed_by, surface=surface, **content)
 
 
 SPARSEST = 1000

@@ -93,6 +93,8 @@ class Footprint:
         First and last scene frame at which it touched each of them.
     pressed_by : ContactSteps or None
         Movement of the sole, to press it again elsewhere; None of a print that was itself edited, and of old records.
+    surface : str
+        What bears most of it (see `ground.surfaces`), where the ground has regions; else empty.
     """
 
     character: str
@@ -117,6 +119,7 @@ class Footprint:
     contact_start: Packed[np.float64] = Packed()
     contact_end: Packed[np.float64] = Packed()
     pressed_by: ContactSteps | None = None
+    surface: str = ""
 
     def tile(self, changes: Changes, frame: float = np.inf) -> Array:
         """Sum of the compression or rim changes up to a frame, (rows, columns) of its window [m]."""

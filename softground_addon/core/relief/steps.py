@@ -58,18 +58,22 @@ class ReliefSettings:
     Attributes
     ----------
     amounts : Amounts
+        Of the ground's look.
     strength : float
         Factor of all of it: 1 for the amounts as given.
     treads : mapping of (str, str) to SoleTread
         Of the soles that have one, by character and name.
     tread_strength : float
         Height of the tread over that of the amounts.
+    of_surfaces : mapping of str to Amounts
+        Of the looks of regions.
     """
 
     amounts: Amounts
     strength: float = 1.0
     treads: Mapping[tuple[str, str], SoleTread] = field(default_factory=dict)
     tread_strength: float = 1.0
+    of_surfaces: Mapping[str, Amounts] = field(default_factory=dict)
 
 
 @sliced
@@ -117,7 +121,7 @@ def _step(
     tread = wanted.treads.get((footprint.character, footprint.sole)) if wanted.tread_strength > 0 else None
     of_print = relief_of_print(
         footprint,
-        wanted.amounts,
+        wanted.of_surfaces.get(footprint.surface, wanted.amounts),
         blur_sigma=blur_sigma,
         finest=_finest(places, point, footprint.cell_size),
         seed=zlib.crc32(step_id(footprint).encode()),

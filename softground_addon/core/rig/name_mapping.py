@@ -40,6 +40,7 @@ def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
     for side, suffix in (("L", "_l"), ("R", "_r")):
         limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
         _settle_ambiguities(limb, names, bones, side, deforming)
+        _keep_to_one_leg(limb, names, bones, side)
         foot, toe = limb["foot"], limb["toe"]
         for joint, segment in _JOINT_HEADS.items():
             if bone := limb[segment]:
@@ -70,6 +71,18 @@ def _settle_ambiguities(
     toe, foot = limb["toe"], limb["foot"]
     if toe and foot and (toe in above(bones, foot) or (foot in deforming and toe not in deforming)):
         limb["toe"] = ""
+
+
+def _keep_to_one_leg(limb: dict[str, str], names: list[BoneName], bones: RigBones, side: str) -> None:
+    """The toe that hangs on the foot, and the shin and thigh that it hangs on, where another leg has such names too."""
+    foot = limb["foot"]
+    if foot and limb["toe"] and foot not in above(bones, limb["toe"]):
+        toes = [name for name in names if foot in above(bones, name.bone)]
+        limb["toe"] = best(toes, LIMBS["toe"], side) or limb["toe"]
+    chain = [*above(bones, foot)] if foot else []
+    for segment in ("shin", "thigh"):
+        if limb[segment] not in chain:
+            limb[segment] = best([name for name in names if name.bone in chain], LIMBS[segment], side) or limb[segment]
 
 
 def _map_trunk(

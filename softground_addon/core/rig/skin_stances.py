@@ -119,7 +119,8 @@ def skin_stances(
         if source.limb and number in present
     }
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
-    lowest_skin = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
+    rise, calm, on_the_spot = tracks.rise * height, tracks.calm * height, bool(contacts.drift.any())
+    lowest_skin = LowSkin(recording.frames, lowest, rise, calm, height, mass, on_the_spot)
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, lowest_skin)
 
 

@@ -16,6 +16,8 @@ OFTEN = 20.0
 """Percentile of the lowest calm skin at which some is on the ground: a runner has a foot there a third of the time."""
 AROUND = 0.5
 """Time to either side over which that is looked for [s]: a stride of a run."""
+WORTH = 0.3
+"""A part that rests at a level by more than this does."""
 FURTHER_PART = 0.15
 """Addition of a further part that rests at a level to a moment's vote for it."""
 SUNK = 0.08
@@ -33,6 +35,8 @@ STANDING_SHARE = 0.8
 """A ground that stands wins with this share of the votes of one that moves."""
 GROUNDED_SHARE = 0.8
 """A velocity of low skin wins with this share of the votes that the ground has with that of all skin."""
+WORLD_FLOOR = 2.0
+"""Weight of the world's floor, at height 0, where two parts or more stand on it as the shot begins."""
 MOST_VOTES = 500
 """Most moments of parts that vote."""
 _SLICE = 200_000
@@ -119,11 +123,15 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
         here = slice(start, start + count)
         near = _at(levels[here, None, None], tracks) * weight
         rests[here] = near.sum(axis=1)
-        votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > 0.3).sum(axis=2) - 1, 0, 3))
+        votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > WORTH).sum(axis=2) - 1, 0, 3))
         sunk = (weight * (tracks.low < levels[here, None, None] - SUNK)).max(axis=2)
         score[here] = (votes - AGAINST * sunk).sum(axis=1)
         yield
-    best = _raised(float(levels[score.argmax()]), levels[rests.argmax(axis=0)], tracks, weight)
+    on_floor = (np.abs(levels) < BIN) & bool((_at(0.0, tracks)[0] > WORTH).sum() > 1)
+    score[on_floor] *= WORLD_FLOOR
+    best = float(levels[score.argmax()])
+    if not on_floor[score.argmax()]:
+        best = _raised(best, levels[rests.argmax(axis=0)], tracks, weight)
     here = weight * (np.abs(tracks.low - best) < 1.5 * BIN)
     return float((tracks.low * here).sum() / here.sum()) if here.any() else best, float(score.max())
 

@@ -29,7 +29,8 @@ def moving_alike(skin: SkinMotion) -> Mask:
     middle = np.add.reduceat(skin.positions, first, axis=1) / size[:, None]
     alike = skin.beside.copy()
     if skin.twin is not None:
-        alike[np.arange(count), skin.twin] = False
+        followed = np.flatnonzero(skin.twin >= 0)
+        alike[followed, skin.twin[followed]] = False
     for one, other in zip(*np.nonzero(alike), strict=True):
         apart = np.linalg.norm(middle[:, one] - middle[:, other], axis=-1)
         alike[one, other] = np.ptp(apart) < ALIKE * skin.height

@@ -10,7 +10,7 @@ from .skin_motion import Array, Indices
 AS_MANY = 0.2
 """Numbers of vertices of a part and its twin differ by less than this share."""
 
-MOST_MIRRORS = 60
+MOST_MIRRORS = 200
 """Pairs of parts, the largest, between which the mirror is looked for."""
 
 BESIDE = 0.05

@@ -179,6 +179,16 @@ def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(ope
     assert found[True, False] == found[False, False]
 
 
+def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
+    scene.softground.characters[0].dirty_soles = 1.0
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    carried = bake(scene).report["totals"]["carried_kg"]
+    before = baked[1].report["totals"]["carried_kg"]
+    assert carried["brought"] > 0.0 == before["brought"]
+    assert carried["left_behind"] > before["left_behind"]
+    assert bake_report.stale_reasons(scene) == ()
+
+
 def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
     assert bake_report.stale_reasons(scene) == ()
     scene.softground.marks = False

@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_presets, jobs, registration, session, settings
+from release import strings
+from softground_addon.blender import ground_presets, jobs, registration, session, settings, translation
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.operators import bake_result, modal_bake, prediction
 from softground_addon.blender.panels import (
@@ -73,15 +74,18 @@ LABEL, CHECKBOX = 88, 112
 """Widest names that are whole beside a field and beside a checkbox, in a sidebar as wide as Blender makes it [px]."""
 
 
-def test_names_are_whole_in_a_sidebar_of_blender_s_own_width(addon):
+@pytest.mark.parametrize("language", ["en_US", *strings.LANGUAGES])
+def test_names_are_whole_in_a_sidebar_of_blender_s_own_width(addon, language):
     blf.size(0, 11.0)
+    own = translation.catalogue(language)
     for group in (cls for cls in registration.CLASSES if issubclass(cls, bpy.types.PropertyGroup)):
         shown = {key: setting for key, setting in group.bl_rna.properties.items() if not setting.is_hidden}
         for key, setting in shown.items():
             in_field_units = any(other.startswith(f"{key}_") for other in shown)
             if not in_field_units and key != "youngs_modulus":
                 room = CHECKBOX if setting.type == "BOOLEAN" else LABEL
-                assert blf.dimensions(0, setting.name)[0] <= room, setting.name
+                name = own.get(setting.name, setting.name)
+                assert blf.dimensions(0, name)[0] <= room, name
 
 
 def test_panels_come_in_the_order_of_work(addon):
@@ -101,6 +105,18 @@ def drawn(panel):
 
 
 CONTROLS = ("prop", "prop_search", "operator", "menu", "template_list", "operator_menu_enum")
+
+
+def test_what_panels_have_translated_is_in_the_catalogues(shot):
+    asked = set()
+    for step in (int, bpy.ops.softground.bake, bpy.ops.softground.add_weather):
+        step()
+        for cls in (cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel | bpy.types.Menu)):
+            if not hasattr(cls, "poll") or cls.poll(bpy.context):
+                options = [options for *_, options in drawn(cls)[0] if options.get("translate") is not False]
+                asked |= {each.get(key, "") for each in options for key in ("text", "heading")}
+    assert asked >= {"Amount", "Presets", "Previous", "Densest Packing", "Snow Depth at the End (cm)"}
+    assert asked <= {*strings.shown(), *strings.AS_IT_IS, ""}
 
 
 def test_the_first_screen_is_a_score_of_controls(shot):

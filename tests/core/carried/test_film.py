@@ -42,15 +42,23 @@ def test_equal_steps_fade_as_a_geometric_series_until_a_trace_is_left(film):
     assert carried.on_soles < TRACE * film.most * AREAS.sum()
 
 
-def test_what_is_picked_up_is_left_shed_or_still_carried_whatever_a_sole_does():
+def test_a_sole_that_starts_dirty_fades_from_what_it_brings():
+    giving, carried = carry(on_floor(*[0.2] * 3), MUD, AREAS, brought=0.5)
+    assert np.array(giving)[:, 0] == pytest.approx(0.5 * MUD.most * 0.8 ** np.arange(3), rel=1e-12)
+    assert carried.brought == pytest.approx(0.5 * MUD.most * AREAS.sum())
+    assert carried.picked_up == 0.0
+
+
+def test_what_is_brought_or_picked_up_is_left_shed_or_still_carried_whatever_a_sole_does():
     chance = np.random.default_rng(3)
     for _ in range(200):
         meetings = [
             Meeting(float(frame), chance.random(4)) if chance.random() < 0.7 else Meeting(frame, shed=chance.random())
             for frame in range(30)
         ]
-        giving, carried = carry(meetings, MUD, AREAS)
-        assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
+        giving, carried = carry(meetings, MUD, AREAS, brought=chance.choice([0.0, chance.random()]))
+        taken = carried.brought + carried.picked_up
+        assert taken == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
         left = sum(
             film @ (AREAS * one.shares) for film, one in zip(giving, meetings, strict=True) if one.shares is not None
         )

@@ -125,6 +125,15 @@ def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
     assert marks_of([loads], steps_of(footprints, {}, {}, {}), terrain.ground, surface="mud") is None
 
 
+def test_dirty_soles_leave_marks_though_they_step_into_nothing():
+    loads, footprints, _ = crossing()
+    muted = range(len(footprints))
+    clean, dirty = marks(muted=muted), marks(muted=muted, brought={loads.motion.name: 0.8})
+    assert not len(clean.position)
+    assert dirty.carried.brought > 0 == dirty.carried.picked_up
+    assert mass_of_steps(dirty).sum() == pytest.approx(dirty.carried.brought - dirty.carried.on_soles, abs=1e-9)
+
+
 def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():
     count = len(crossing()[1])
     whole, fewer, none = marks(), marks(muted=(0, 1)), marks(muted=range(count))

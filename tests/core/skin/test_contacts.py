@@ -286,6 +286,19 @@ def run_on_the_spot(stance: int, rest: np.ndarray, pace: float, base: float = 0.
     return PartTracks(low, ways[0], np.zeros((60, 1)), ways, 0.3, 24.0)
 
 
+@pytest.mark.parametrize(("start", "ground"), [((0.0, 0.0), 0.0), ((0.0, 0.3), 0.05), ((0.4, 0.0), 0.05)])
+def test_the_ground_is_the_floor_of_the_world_where_both_feet_stand_on_it_as_the_shot_begins(
+    start: tuple[float, float], ground: float
+) -> None:
+    """A kick whose standing foot hovers while the other one is in the air, as in cycles that nobody corrected."""
+    low = np.zeros((24, 2))
+    low[4:18, 0], low[4:18, 1] = 0.4, 0.05
+    low[0] = start
+    rise = np.where(low == 0.4, 1.0, 0.0)
+    tracks = PartTracks(low, np.zeros((24, 2, 2)), rise, np.zeros((2, 24, 2, 2)), 0.15, 24.0)
+    assert ground_of(tracks)[0] == pytest.approx(ground, abs=0.004)
+
+
 @pytest.mark.parametrize("base", [0.0, -0.3])
 def test_the_ground_moves_as_feet_do_that_stand_on_it_not_as_those_of_a_flight(base: float) -> None:
     hangs = 0.04 + 0.04 * np.sin(np.linspace(0, np.pi, 7))
@@ -390,8 +403,8 @@ def test_pieces_on_different_branches_that_move_alike_are_one_contact() -> None:
     order = np.argsort(part, kind="stable")
     links = np.zeros((4, 4), dtype=bool)
     beside = np.ones((4, 4), dtype=bool)  # even the feet lie side by side
-    twin = np.array([1, 0, 2, 3])
-    for against, contacts in ((beside, 2), (None, 3)):
+    twins = np.array([1, 0, 2, 3]), np.array([1, -1, 2, 3])  # the right foot's twin may not be followed
+    for twin, against, contacts in ((twins[0], beside, 2), (twins[1], beside, 2), (twins[0], None, 3)):
         skin_of_feet = SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height, twin, against)
         found = find_contacts(skin_of_feet)
         assert found.bears.shape[1] == contacts

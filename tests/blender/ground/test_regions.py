@@ -1,0 +1,320 @@
+"""One ground of several materials, each of which names a preset: snow, sand, mud, and a hard floor."""
+
+import json
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import ground_slots, settings
+from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender.carried import marks_object
+from softground_addon.blender.debris import debris_nodes, debris_object
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.materials.materials import MARK, OVER
+from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
+from softground_addon.core.ground import presets
+from softground_addon.core.ground.regions import MOST
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit
+from tests.blender import command_line, shots
+from tests.blender.grounds import bake, plane, refusal
+
+BORDERS = (-0.9, -1.9, -2.9)
+"""Along the walk, which goes toward -y [m]."""
+PRESETS = ("", "dry_sand", "mud", ground_slots.HARD)
+
+
+def over_four(scene):
+    shots.walker(scene, frames=110)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.load_preset(name="Snow")
+    options = scene.softground
+    ground = options.ground = plane(scene, size=10.0, vertices=201)
+    options.cell_size, options.detail, options.debris, options.marks = 0.02, "NEVER", False, False
+    for name in ("White", "Yellow", "Brown", "Grey"):
+        ground.data.materials.append(bpy.data.materials.new(name))
+    divide(ground, ground.data.polygons)
+
+
+def divide(ground, faces):
+    """Give the faces of a ground the slots of the stripes that they lie in."""
+    for face in faces:
+        face.material_index = int(np.searchsorted(-np.array(BORDERS), -face.center.y))
+    ground.data.update()
+
+
+def choose(presets=PRESETS):
+    for slot, preset in zip(bpy.context.scene.softground.ground.material_slots, presets, strict=False):
+        slot.material.softground_preset = preset
+
+
+@pytest.fixture
+def four(opened_as):
+    return opened_as(over_four)
+
+
+def where(step):
+    return int(np.searchsorted(-np.array(BORDERS), -step.position[1]))
+
+
+def bytes_of(footprints):
+    return record.dump(record.BakeRecord(list(footprints), {}))
+
+
+def inside(step, stripe):
+    """Return whether a sole stayed in one stripe, three cells from its borders."""
+    y = step.window.centres(step.cell_size)[1][np.asarray(step.contact_cells) // step.window.columns]
+    ends = (5.0, *BORDERS, -5.0)
+    return ends[stripe + 1] + 0.06 < y.min() and y.max() < ends[stripe] - 0.06
+
+
+def test_each_material_prints_as_its_preset_and_a_hard_one_not_at_all(four):
+    choose()
+    result = bake(four)
+    surfaces = {step.surface for step in result.footprints}
+    assert surfaces == {"snow", "sand", "mud"}
+    assert all(where(step) != 3 or abs(step.position[1] - BORDERS[2]) < 0.15 for step in result.footprints)
+    steps = {(row["character"], row["contact"], row["frame_start"]): row["surface"] for row in result.report["steps"]}
+    assert set(steps.values()) == surfaces
+    assert {row["surface"] for row in result.report["events"] if row["step"]} == surfaces
+    for stripe, preset in enumerate(PRESETS[:3]):
+        choose(("",) * 4)
+        bpy.ops.softground.load_preset(name=preset or "snow")
+        four.softground.debris, four.softground.cell_size = False, 0.02
+        alone = {(step.sole, step.start_frame): step for step in bake(four).footprints}
+        mine = [step for step in result.footprints if where(step) == stripe and inside(step, stripe)]
+        assert mine
+        for step in mine:
+            other = alone[step.sole, step.start_frame]
+            assert step.max_depth_m == pytest.approx(other.max_depth_m, rel=1e-6)
+            assert step.compressed_m3 == pytest.approx(other.compressed_m3, rel=1e-6)
+            assert step.rim_m3 == pytest.approx(other.rim_m3, rel=1e-6)
+
+
+def test_one_preset_in_all_slots_is_as_without_bit_for_bit(four):
+    before = bake(four)
+    assert "regions" not in before.report["inputs"]
+    assert not any("surface" in row for row in before.report["steps"])
+    choose(("snow", "", "snow", "snow"))
+    after = bake(four)
+    assert bytes_of(after.footprints) == bytes_of(before.footprints)
+    assert after.report["totals"] == before.report["totals"]
+
+
+def test_a_bake_is_outdated_by_a_preset_or_a_face_that_is_of_another_material(four):
+    bake(four)
+    assert bake_report.stale_reasons(four) == ()
+    four.softground.ground.data.polygons[-1].material_index = 3
+    assert bake_report.stale_reasons(four) == (), "without a preset, materials are nothing but looks"
+    divide(four.softground.ground, four.softground.ground.data.polygons)
+    choose()
+    assert bake_report.stale_reasons(four) == (
+        "The settings have changed",
+        "The modifiers of 'Field', or what is painted on it, have changed",
+    )
+    bake(four)
+    assert bake_report.stale_reasons(four) == ()
+    four.softground.ground.data.polygons[-1].material_index = 3
+    assert bake_report.stale_reasons(four) == ("The modifiers of 'Field', or what is painted on it, have changed",)
+
+
+def test_a_face_attribute_counts_in_place_of_the_materials(four):
+    choose()
+    mesh = four.softground.ground.data
+    slots = ground_slots.of_faces(mesh).copy()
+    expected = bake(four).footprints
+    attribute = mesh.attributes.new(ground_slots.ATTRIBUTE, "INT", "FACE")
+    attribute.data.foreach_set("value", np.where(slots == 0, -1, slots).astype(np.int32))
+    mesh.attributes["material_index"].data.foreach_set("value", np.zeros(len(slots), np.int32))
+    attribute = mesh.attributes[ground_slots.ATTRIBUTE]
+    values = np.empty(len(slots), np.int32)
+    attribute.data.foreach_get("value", values)
+    assert set(values) == {-1, 1, 2, 3}
+    assert bytes_of(bake(four).footprints) == bytes_of(expected)
+
+
+def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
+    choose()
+    bake(four)
+    editable = step_edits.editable(four)
+    number, step = next((n, s) for n, s in enumerate(editable.left.steps) if where(s.baked) == 0)
+    edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
+    step_edits.edit(four, editable, {step.name: edit})
+    left = baked_ground.record_of(four.softground.ground).steps[number].left
+    assert left.surface == "mud"
+    assert left.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
+
+
+def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(four):
+    choose()
+    ground = four.softground.ground
+    theirs = [slot.material for slot in ground.material_slots]
+    bpy.ops.softground.apply_look()
+    shown = [slot.material for slot in baked_ground.display_mesh_of(ground).material_slots]
+    assert [one.get(MARK) for one in shown] == ["snow over", "sand over", "mud over", None]
+    assert [one.get(OVER) for one in shown[:3]] == theirs[:3]
+    assert shown[3] == theirs[3]
+    bpy.ops.softground.load_preset(name="Soil")
+    shown = [slot.material for slot in baked_ground.display_mesh_of(ground).material_slots]
+    assert [one.get(MARK) for one in shown] == ["soil over", "sand over", "mud over", None]
+    assert {step.surface for step in bake(four).footprints} == {"soil", "sand", "mud"}
+    bpy.ops.softground.clear_bake()
+    assert [slot.material for slot in ground.material_slots] == theirs
+    assert [one.softground_preset for one in theirs] == list(PRESETS)
+
+
+def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset(four):
+    context, ground = bpy.context, four.softground.ground
+    assert SOFTGROUND_PT_regions.poll(context)
+    while len(ground.data.materials) > 1:
+        ground.data.materials.pop()
+    assert not SOFTGROUND_PT_regions.poll(context)
+    assert bpy.ops.softground.region_preset(slot=0, preset="mud") == {"FINISHED"}
+    assert ground.material_slots[0].material.softground_preset == "mud"
+    assert SOFTGROUND_PT_regions.poll(context)
+    assert ground_slots.title_of(ground.material_slots[0].material) == "Mud"
+    bpy.ops.softground.region_preset(slot=0, preset="none")
+    assert ground_slots.title_of(ground.material_slots[0].material) == "Hard Floor"
+    bpy.ops.softground.region_preset(slot=0, preset="AS_GROUND")
+    assert ground.material_slots[0].material.softground_preset == ""
+
+
+def test_the_panel_has_a_menu_for_each_material_with_its_preset(four):
+    choose(("", "dry_sand", "none", "custard"))
+    layout = MagicMock()
+    layout.column.return_value = layout.split.return_value = layout
+    SOFTGROUND_PT_regions.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
+    labels = [call.kwargs["text"] for call in layout.label.call_args_list]
+    menus = [call.kwargs["text"] for call in layout.operator_menu_enum.call_args_list]
+    assert labels == ["White", "Yellow", "Brown", "Grey"]
+    assert menus == ["As the Ground", "Dry Sand", "Hard Floor", "? custard"]
+
+
+def test_more_presets_than_the_solver_takes_are_refused(four):
+    names = sorted(path.stem for path in presets.FOLDER.glob("*.json") if path.stem != "snow")[:MOST]
+    data = four.softground.ground.data
+    for name in names[len(data.materials) :]:
+        data.materials.append(bpy.data.materials.new(name))
+    choose(names)
+    assert f"more than {MOST - 1} presets" in refusal(bpy.ops.softground.bake)
+    choose(names[1:])
+    data.materials.pop()
+    assert len(settings.snapshot(four).kinds[0]) == MOST
+
+
+def test_a_linked_material_keeps_its_preset_until_it_is_local(four, tmp_path):
+    library = tmp_path / "library.blend"
+    stored = bpy.data.materials.new("Stored")
+    stored.softground_preset = "mud"
+    bpy.data.libraries.write(str(library), {stored})
+    bpy.data.materials.remove(stored)
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.materials = ["Stored"]
+    (four.softground.ground.material_slots[1].material,) = wanted.materials
+    with pytest.raises(RuntimeError, match="'Stored' is linked from another file"):
+        bpy.ops.softground.region_preset(slot=1, preset="snow")
+    assert "mud" in {step.surface for step in bake(four).footprints}
+
+
+def test_a_preset_that_is_gone_is_named_with_its_material_and_nothing_changes(four):
+    choose(("", "custard"))
+    assert "Material 'Yellow' of ground 'Field': There is no preset 'custard'" in refusal(bpy.ops.softground.bake)
+    four.softground.ground.data.attributes.new(ground_slots.ATTRIBUTE, "FLOAT", "POINT")
+    choose(("", "mud"))
+    assert "is not an integer on faces" in refusal(bpy.ops.softground.bake)
+
+
+def test_a_ground_that_is_hard_wherever_somebody_walks_is_refused(four):
+    choose((ground_slots.HARD,) * 4)
+    assert "'Field' is nothing but hard floor under the character's path" in refusal(bpy.ops.softground.bake)
+
+
+def test_a_slot_without_a_material_of_one_s_own_is_refused(four):
+    ground = four.softground.ground
+    ground.material_slots[1].material = None
+    with pytest.raises(RuntimeError, match="Slot 2 of 'Field' has no material"):
+        bpy.ops.softground.region_preset(slot=1, preset="mud")
+    bpy.ops.softground.apply_look()
+    with pytest.raises(RuntimeError, match="goes with the preset of the ground"):
+        bpy.ops.softground.region_preset(slot=1, preset="mud")
+    with pytest.raises(RuntimeError, match="no such material slot"):
+        bpy.ops.softground.region_preset(slot=9, preset="mud")
+
+
+def test_what_the_record_says_is_read_back(four):
+    choose()
+    bake(four)
+    left = baked_ground.record_of(four.softground.ground)
+    said = json.loads(json.dumps(left.about["inputs"]["regions"]))
+    assert [(one["slot"], one["preset"], one["surface"]) for one in said] == [
+        (1, "dry_sand", "sand"),
+        (2, "mud", "mud"),
+        (3, "none", ""),
+    ]
+    choose(("", "", "", ""))
+    made_with = step_edits.editable(four).made_with
+    choose()
+    assert made_with.regions == settings.snapshot(four).regions
+
+
+def test_crumbs_look_like_the_material_that_they_come_from(four):
+    choose()
+    four.softground.debris = True
+    bake(four)
+    debris = debris_object.of(four.softground.ground)
+    looks = np.empty(len(debris.data.vertices), np.int32)
+    debris.data.attributes[debris_nodes.LOOK].data.foreach_get("value", looks)
+    steps = baked_ground.record_of(four.softground.ground).steps
+    number = np.empty(len(looks), np.int32)
+    debris.data.attributes["step"].data.foreach_get("value", number)
+    order = ["snow", *dict.fromkeys(step.left.surface for step in steps if step.left.surface != "snow")]
+    assert [order[look] for look in looks] == [steps[n].left.surface for n in number]
+    four.frame_set(four.softground.frame_end + 60)
+    shown = debris.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    pieces = {
+        instance.object.data.name.removeprefix("SoftGround ").partition(" Pieces")[0]
+        for instance in bpy.context.evaluated_depsgraph_get().object_instances
+        if instance.is_instance and instance.parent == shown
+    }
+    assert pieces >= {"Snow", "Mud"}
+    choose(("", "", "", ""))
+    bake(four)
+    assert debris_nodes.LOOK not in debris_object.of(four.softground.ground).data.attributes
+    assert sum(bool(block.get(debris_nodes.MARK)) for block in bpy.data.collections) == 1
+
+
+def test_soles_carry_what_sticks_onto_a_hard_material(four):
+    choose()
+    four.softground.marks = True
+    assert bake(four).report["totals"]["carried_kg"]["picked_up"] > 0
+    marks = marks_object.of(four.softground.ground)
+    bpy.context.view_layer.update()
+    y = [(marks.matrix_world @ vertex.co).y for vertex in marks.data.vertices]
+    assert y
+    assert max(y) < BORDERS[2] + 0.01
+
+
+def test_the_command_line_bakes_what_the_file_says(four, tmp_path):
+    choose()
+    expected = [(row["id"], row["surface"], row["compressed_m3"]) for row in bake(four).report["steps"]]
+    bpy.ops.softground.clear_bake()
+    shot, report = tmp_path / "four.blend", tmp_path / "report.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    done = command_line.run("bake", shot, "--dry-run", "--report", report)
+    assert done.returncode == 0, done.stderr
+    steps = json.loads(report.read_text())["steps"]
+    assert [(row["id"], row["surface"], row["compressed_m3"]) for row in steps] == expected
+
+
+def test_live_footprints_are_those_of_the_bake(four):
+    choose()
+    four.frame_set(four.softground.frame_start)
+    bpy.ops.softground.live()
+    four.frame_set(four.softground.frame_end)
+    bpy.ops.softground.live(keep=True)
+    kept = baked_ground.record_of(four.softground.ground).footprints
+    bpy.ops.softground.clear_bake()
+    assert bytes_of(kept) == bytes_of(bake(four).footprints)
