@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import ceil
+from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from ..ground.deep_ground import wading
 from ..ground.hard_ground import bare
 from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
-from ..ground.sparse_grid import SparseGrid, Window
+from ..ground.sparse_grid import TILE, SampledGrid, Window
 from ..ground.surfaces import find
 from ..ground.variation import VariationTiles
 from ..legs.grounding import Response
@@ -28,7 +28,7 @@ from ..motion.motion import CharacterMotion
 from ..numerics.interpolation import cubic
 from ..numerics.slices import Slices, sliced
 from ..pressing.repose import SWEEPS_TO_REST
-from ..record.footprints import QUANTUM, Footprint, FootprintRecorder, quantised
+from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder, quantised
 from ..record.record import BakeRecord
 from ..soles.undersides import lowest_surface
 from .carver import REACH, CarvedCells, Walls
@@ -38,16 +38,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-CUTS = 4
-"""Most cuts in a frame."""
 POSES_ALONG_SOLE = 14
 """Nothing in the ground moves further from one pose to the next than this part of a sole, or a cell: 2 cm, from which
 the outline of a shank has scallops of a millimetre."""
 MOST_POSES = 32
 """Most poses of a body in a frame."""
-SLIDES_EVERY, SWEEPS = 2, 8
-"""Loose matter slides after every so many frames, in so many sweeps (`repose.slid`); the rest goes on in the next, and
-comes to rest once the leg is on its way to its next step."""
+SLIDES_EVERY, SWEEPS = 1 / 12, 8
+"""Ground without cohesion slides while it is carved, after every so many seconds in so many sweeps (`repose.slid`)."""
+SETTLING = 0.2
+"""What is loose comes to rest once the leg is on its way to its next step, within this time [s]."""
 LEAST = round(1e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
 FRAMES_AT_ONCE = 16
@@ -79,10 +78,39 @@ class _Step:
         return max(self.footprint.end_frame, *(float(each.frames.max(initial=-np.inf)) for each in changes)) + 1.0
 
     @cached_property
-    def contact(self) -> tuple[Indices, Array, Array]:
-        """Cells that its sole touched, and from when to when."""
+    def _contact(self) -> tuple[Indices, Array, Array]:
         footprint = self.footprint
         return footprint.contact_cells[:], footprint.contact_start[:], footprint.contact_end[:]
+
+    @cached_property
+    def _changes(self) -> list[tuple[Changes, Indices, Array]]:
+        footprint = self.footprint
+        both = ((footprint.compression, -QUANTUM), (footprint.rim, QUANTUM))
+        return [(changes, changes.cells, changes.amounts * sign) for changes, sign in both]
+
+    def release(self) -> None:
+        """Forget what takes memory."""
+        for name in ("_contact", "_changes"):
+            self.__dict__.pop(name, None)
+
+    def touches(self, since: float, frame: float) -> Mask:
+        """Cells of its print that its sole touches between two frames, (rows, columns)."""
+        window = self.footprint.window
+        contact = np.zeros(window.cells, dtype=bool)
+        cells, start, end = self._contact
+        contact[cells[(start <= frame) & (end > since)]] = True
+        return contact.reshape(window.rows, window.columns)
+
+    def change(self, since: float, frame: float) -> Array | None:
+        """How far its print raised the ground between two frames, (rows, columns) [m]; None if nowhere."""
+        window, raised = self.footprint.window, None
+        for changes, cells, amounts in self._changes:
+            first, last = np.searchsorted(changes.frames, (since + 1e-6, frame + 1e-6))
+            part = slice(changes.first[first], changes.first[last])
+            if part.start < part.stop:
+                more = np.bincount(cells[part], amounts[part], window.cells)
+                raised = more if raised is None else raised + more
+        return None if raised is None else raised.reshape(window.rows, window.columns)
 
     @property
     def spacing(self) -> float:
@@ -147,8 +175,8 @@ def carves_of(
         number: _Step(footprint, _is_deep(footprint), FootprintRecorder(some.cell_size, some.frame_step))
         for number, footprint in footprints.items()
     }
-    carving = _Carving(ground, walls, some.cell_size, list(steps.values()))
     frames = skins[0][2].frames
+    carving = _Carving(ground, walls, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
     bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
     carving.press(-np.inf, float(frames[0]))
     for number, (since, frame) in enumerate(pairwise(frames.tolist()), start=1):
@@ -158,12 +186,12 @@ def carves_of(
             around = next(body.poses)
             for step, left, triangles in body.parts(number):
                 if left is not None:
-                    carving.settle(left, frame)
+                    carving.settle(left, frame, float(frames[-1]))
                 if step.is_deep:
                     carving.carve(step, around, triangles, frame)
     for step in steps.values():
         yield
-        carving.settle(step, float(frames[-1]))
+        carving.settle(step, float(frames[-1]), float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
 
 
@@ -221,49 +249,51 @@ def _poses(skin: RespondedSkin) -> Iterator[Array]:
 class _Carving:
     """The ground of a shot as it is carved."""
 
-    def __init__(self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[_Step]) -> None:
-        self._walls, self._cell_size, self._steps = walls, cell_size, steps
+    def __init__(self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[_Step], rate: float) -> None:
+        self._walls, self._cell_size = walls, cell_size
+        self._coming = sorted(steps, key=lambda step: step.begins, reverse=True)
+        self._pressing: list[_Step] = []
+        """Steps whose prints are changing."""
+        self._slides_every, self._settling = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._highest = 0.0
         """Highest surface over the undisturbed ground so far [m]."""
         self._layer_depth = ground.material.layer_depth
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
-        self._pressed = SparseGrid(cell_size, channels=1)
-        self._lowest = SparseGrid(cell_size, channels=1, fill=np.inf)
-        self._loose = SparseGrid(cell_size, channels=1)
-        self._recorded = SparseGrid(cell_size, channels=2)
-        self._contact = SparseGrid(cell_size, channels=1)
+        self._cells = SampledGrid(self._untouched, cell_size, channels=8)
+        """Terrain, its openness, the layer's floor, T, K, loose matter; what is recorded of the cut and of this."""
+        self._contacts: list[tuple[Window, Mask]] = []
+
+    def _untouched(self, x: Array, y: Array) -> Array:
+        """The channels of a tile, from its cell centres."""
+        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
+        surface = self._undisturbed.surface(window)
+        terrain, nothing = np.nan_to_num(surface.heights), np.zeros(x.shape)
+        depth = self._layer_depth * (self._variation.factors(window).depth if self._variation else 1.0)
+        bottom = terrain - depth
+        return np.stack([terrain, surface.bears, bottom, terrain, nothing + np.inf, nothing, nothing, nothing])
 
     def press(self, since: float, frame: float) -> None:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
-        self._contact = SparseGrid(self._cell_size, channels=1)
-        for step in self._steps:
-            footprint = step.footprint
-            if not step.begins <= frame or since >= step.ends:
-                continue
-            window = footprint.window
-            change = _change(footprint, since, frame)
-            touched, start, end = step.contact
-            touching = (start <= frame) & (end > since)
+        while self._coming and self._coming[-1].begins <= frame:
+            self._pressing.append(self._coming.pop())
+        self._contacts = [(step.footprint.window, step.touches(since, frame)) for step in self._pressing]
+        for step, (window, touching) in zip(self._pressing, self._contacts, strict=True):
+            change = step.change(since, frame)
             if change is None and not touching.any():
                 continue
-            contact = self._contact.read(window)[0]
-            contact.reshape(-1)[touched[touching]] = 1.0
-            self._contact.write(window, contact[None])
-            cells = self._cells(window)
+            cells, channels = self._read(window)
             if change is not None:
-                self._pressed.write(window, self._pressed.read(window) + change)
                 cells.press(cells.pressed + change)
             cells.pack()
-            self._keep(step, window, cells, frame, LEAST)
+            self._write(step, window, cells, channels, frame, LEAST)
+        self._pressing = [step for step in self._pressing if step.ends > frame or step.release()]
 
     def carve(self, step: _Step, around: Array, triangles: Indices, frame: float) -> None:
         """Cut the ground to a part of a body over the frame before, from its vertices (4, V, 3) around that span."""
-        used, triangles = np.unique(triangles, return_inverse=True)
-        triangles, around = triangles.reshape(-1, 3), around[:, used]
-        both = around[1:3]
         if not np.isfinite(around).all():
             return
+        both = around[1:3]
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
@@ -271,43 +301,39 @@ class _Carving:
         triangles = triangles[low[triangles].any(axis=1)]
         if not len(triangles):
             return
-        corners = both[:, np.unique(triangles), :2]
-        margin = ceil(2 * REACH / self._cell_size) + 2
-        window = Window.around(corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), self._cell_size).expanded(margin)
-        cells = self._cells(window)
-        way = both[1, low] - both[0, low]
+        used, triangles = np.unique(triangles, return_inverse=True)
+        around, low = around[:, used], low[used]
+        before, after = around[1:3]
+        way = (after - before)[low]
         distance = np.linalg.norm(way, axis=1)
-        ahead, poses = way[distance.argmax(), :2], ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
-        floor = cells.terrain - self._layer_depth * (self._variation.factors(window).depth if self._variation else 1.0)
-        cuts = min(poses, CUTS)
-        underside = np.empty(0)
-        for part in np.array_split(np.arange(1, poses + 1) / poses, cuts):
-            underside = self._underside(cubic(around, 1.0 + part), triangles, window)
-            underside = np.maximum(underside, floor)
-            cells.cut(underside, ahead, self._walls.packing)
-        if round(frame) % SLIDES_EVERY == 0:
+        poses = ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
+        places = cubic(around, 1.0 + np.arange(1, poses + 1) / poses)
+        margin = ceil(2 * REACH / self._cell_size) + 2
+        flat = places[..., :2].reshape(-1, 2)
+        window = Window.around(flat.min(axis=0), flat.max(axis=0), self._cell_size).expanded(margin)
+        cells, channels = self._read(window)
+        numbers = triangles.reshape(-1, 3) + len(used) * np.arange(poses)[:, None, None]
+        origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
+        shape = window.rows, window.columns
+        underside = lowest_surface(places.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
+        underside = np.maximum(underside, channels[2])
+        cells.cut(underside, way[distance.argmax(), :2], self._walls.packing)
+        if not self._walls.strength and round(frame) % self._slides_every == 0:
             body = underside < cells.surface + self._cell_size
             cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
-        self._keep(step, window, cells, frame, LEAST)
+        self._write(step, window, cells, channels, frame, LEAST)
 
-    def _underside(self, poses: Array, triangles: Indices, window: Window) -> Array:
-        """Lowest surface of some poses (N, V, 3) over the cells of a window."""
-        origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
-        numbers = triangles + poses.shape[1] * np.arange(len(poses))[:, None, None]
-        shape = window.rows, window.columns
-        return lowest_surface(poses.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
-
-    def settle(self, step: _Step, frame: float) -> None:
+    def settle(self, step: _Step, frame: float, last: float) -> None:
         """Let what a step has carved come to rest, and record all of it; nothing happens where it has."""
         if step.at_rest or not step.recorder.frames:
             return
         window = step.recorder.window
-        cells = self._cells(window)
+        cells, _ = self._read(window)
         window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
-        cells = self._cells(window)
+        cells, channels = self._read(window)
         cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
-        cells.gather(self._recorded.read(window)[1] * QUANTUM, LEAST * QUANTUM)
-        self._keep(step, window, cells, frame, 1)
+        cells.gather(channels[7] * QUANTUM, LEAST * QUANTUM)
+        self._write(step, window, cells, channels, frame, 1, max(1, min(self._settling, round(last - frame) + 1)))
 
     def footprint(self, step: _Step) -> Footprint:
         """What a step has carved."""
@@ -329,51 +355,39 @@ class _Carving:
             load_n=np.zeros(0),
         )
 
-    def _cells(self, window: Window) -> CarvedCells:
-        surface = self._undisturbed.surface(window)
-        terrain = np.nan_to_num(surface.heights)
-        return CarvedCells(
-            cell_size=self._cell_size,
-            terrain=terrain,
-            closed=~surface.bears,
-            contact=self._contact.read(window)[0] > 0,
-            pressed=terrain + self._pressed.read(window)[0],
-            lowest=self._lowest.read(window)[0],
-            loose=self._loose.read(window)[0],
-        )
+    def _read(self, window: Window) -> tuple[CarvedCells, Array]:
+        """The cells of a window, and their channels."""
+        channels = self._cells.read(window)
+        contact = np.zeros((window.rows, window.columns), dtype=bool)
+        for around, touching in self._contacts:
+            if (shared := around.intersection(window)) is not None:
+                contact[window.slices(shared)] |= touching[around.slices(shared)]
+        terrain, bears, _, pressed, lowest, loose, _, _ = channels
+        return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, lowest, loose), channels
 
-    def _keep(self, step: _Step, window: Window, cells: CarvedCells, frame: float, least: int) -> None:
-        """Write cells back, and record what of their changes comes to the least [QUANTUM]."""
+    def _write(
+        self, step: _Step, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int, frames: int = 1
+    ) -> None:
+        """Write cells back, and record over some frames what of their changes comes to the least [QUANTUM]."""
         step.at_rest = least == 1
         step.cut += cells.cut_height
         step.packed += cells.packed
         step.unplaced += cells.unplaced
         self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
-        self._lowest.write(window, cells.lowest[None])
-        self._loose.write(window, cells.loose[None])
         carved = np.stack([np.maximum(cells.pressed - cells.lowest, 0.0), cells.loose])
-        before = self._recorded.read(window)
-        change = quantised(carved) - before.astype(np.int64)
+        change = quantised(carved) - channels[6:].astype(np.int64)
         counts = (np.abs(change) >= least).any(axis=0)
+        change *= counts
+        channels[3:6] = cells.pressed, cells.lowest, cells.loose
+        channels[6:] += change
+        self._cells.write(window, channels)
         rows, columns = (np.flatnonzero(counts.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return
-        change *= counts
         part = Window(
             window.column + int(columns[0]), window.row + int(rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
         )
         change = change[:, *window.slices(part)]
-        step.recorder.add(frame, part, change, np.zeros(change.shape[1:], bool))
-        self._recorded.write(part, self._recorded.read(part) + change)
-
-
-def _change(footprint: Footprint, since: float, frame: float) -> Array | None:
-    """How far a print raised the ground between two frames, (rows, columns) of its window [m]; None if nowhere."""
-    raised, window = np.zeros(footprint.window.cells), footprint.window
-    moves = False
-    for changes, sign in ((footprint.compression, -1.0), (footprint.rim, 1.0)):
-        first, last = np.searchsorted(changes.frames, (since + 1e-6, frame + 1e-6))
-        part = slice(changes.first[first], changes.first[last])
-        moves |= part.start < part.stop
-        raised += sign * np.bincount(changes.cells[part], changes.amounts[part], window.cells)
-    return (raised * QUANTUM).reshape(window.rows, window.columns) if moves else None
+        for number in range(frames):
+            share = change * (number + 1) // frames - change * number // frames
+            step.recorder.add(frame + number, part, share, np.zeros(change.shape[1:], bool))

@@ -15,6 +15,7 @@ from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
+from ..ground.deep_ground import wading
 from .wading import depth_of_contacts, ploughed
 
 Array = NDArray[np.float64]
@@ -186,8 +187,11 @@ def place_sole(
     stands = touching & np.isfinite(on_top)
     sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
     lift = between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
-    missing = needed - lift - ploughed(depth_of_contacts(sinkage, touching), sole.sole.length)
-    lift += _swing_clearance(missing, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
+    depth, clear_time = depth_of_contacts(sinkage, touching), CLEAR_TIME * motion.adult_second
+    ploughs = ploughed(depth, sole.sole.length)
+    lift += _swing_clearance(needed - lift - ploughs, touching, max(1, round(clear_time)))
+    if (wades := wading(depth, sole.sole.length)).any():
+        lift -= wades * _swing_lowered(lift - on_top + ploughs, touching, clear_time)
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change
@@ -304,6 +308,12 @@ def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
     distance = _frames_from_contact(touching)
     extra[~touching] = (wanted * smooth_step(distance / (reach + 1)))[~touching]
     return extra
+
+
+def _swing_lowered(spare: Array, touching: Mask, time: float) -> Array:
+    """How far a foot that ploughs swings lower (F,) [m]: by what is to spare, 0 at contacts."""
+    distance = _frames_from_contact(touching)
+    return np.where(np.isfinite(spare), np.maximum(spare, 0.0), 0.0) * smooth_step(distance / time)
 
 
 def _frames_from_contact(touching: Mask) -> Array:
