@@ -34,7 +34,7 @@ THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
-REACH = 0.05
+REACH = 0.04
 """How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
 
 

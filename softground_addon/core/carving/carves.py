@@ -27,7 +27,6 @@ from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
 from ..numerics.interpolation import cubic
 from ..numerics.slices import Slices, sliced
-from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder, quantised
 from ..record.record import BakeRecord
 from ..soles.undersides import lowest_surface
@@ -43,12 +42,14 @@ POSES_ALONG_SOLE = 14
 the outline of a shank has scallops of a millimetre."""
 MOST_POSES = 32
 """Most poses of a body in a frame."""
-SLIDES_EVERY, SWEEPS = 1 / 12, 8
-"""Ground without cohesion slides while it is carved, after every so many seconds in so many sweeps (`repose.slid`)."""
-SETTLING = 0.2
-"""What is loose comes to rest once the leg is on its way to its next step, within this time [s]."""
-LEAST = round(1e-3 / QUANTUM)
-"""Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 1 mm."""
+SLIDES_EVERY, SWEEPS = 1 / 8, 8
+"""Loose matter slides after every so many seconds in so many sweeps (`repose.slid`); the rest goes on in the next."""
+SETTLING, SWEEPS_TO_SETTLE = 0.2, 96
+"""It comes to rest once the leg is on its way to its next step, within this time [s], in at most so many sweeps."""
+LEAST = round(3e-3 / QUANTUM)
+"""Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 3 mm."""
+THINNEST = 2e-3
+"""Loose matter that comes to rest is gathered where it is thinner [m]."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -318,7 +319,7 @@ class _Carving:
         underside = lowest_surface(places.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
         underside = np.maximum(underside, channels[2])
         cells.cut(underside, way[distance.argmax(), :2], self._walls.packing)
-        if not self._walls.strength and round(frame) % self._slides_every == 0:
+        if round(frame) % self._slides_every == 0:
             body = underside < cells.surface + self._cell_size
             cells.slide(self._walls, body, (window.row, window.column), SWEEPS)
         self._write(step, window, cells, channels, frame, LEAST)
@@ -331,8 +332,8 @@ class _Carving:
         cells, _ = self._read(window)
         window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
         cells, channels = self._read(window)
-        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_REST)
-        cells.gather(channels[7] * QUANTUM, LEAST * QUANTUM)
+        cells.slide(self._walls, np.zeros_like(cells.closed), (window.row, window.column), SWEEPS_TO_SETTLE)
+        cells.gather(channels[7] * QUANTUM, THINNEST)
         self._write(step, window, cells, channels, frame, 1, max(1, min(self._settling, round(last - frame) + 1)))
 
     def footprint(self, step: _Step) -> Footprint:
