@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
-from ..ground.deep_ground import wading
 from .wading import depth_of_contacts, dragged, ploughed
 
 Array = NDArray[np.float64]
@@ -277,9 +277,7 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
     return posed
 
 
-def between_contacts(
-    values: Array, touching: Mask, *, upward: bool = False, level: Array | float = 0.0
-) -> Array:
+def between_contacts(values: Array, touching: Mask, *, upward: bool = False, level: Array | float = 0.0) -> Array:
     """Values (F,) or (F, N) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
 
     With `upward`, a value that falls at the end of a contact or will rise after the start of one does not go on so

@@ -60,7 +60,7 @@ def ploughed(depth: Any, sole_length: float) -> Any:
 
 
 def dragged(depth: Any, sole_length: float) -> Any:
-    """Share of dragging in a swing: from 1 where a foot stays in the top of the layer to 0 where it is lifted out of it.
+    """Share of dragging in a swing: 1 where a foot stays in the top of the layer, 0 where it is lifted out of it.
 
     Parameters
     ----------
