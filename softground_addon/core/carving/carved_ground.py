@@ -28,6 +28,8 @@ MOST_POSES = 32
 """Most poses of a body in a frame."""
 SLIDES_EVERY, SWEEPS = 1 / 8, 8
 """Loose matter slides after every so many seconds in so many sweeps (`repose.slid`); the rest goes on in the next."""
+PUSHED = 1 / 24
+"""Time in which loose matter that is pushed along is packed as much as what stood is by the first cut [s]."""
 SETTLING, SWEEPS_TO_SETTLE = 1 / 8, 96
 """It comes to rest once the leg is on its way to its next step, within this time [s], in at most so many sweeps."""
 LEAST = round(3e-3 / QUANTUM)
@@ -76,6 +78,7 @@ class CarvedGround:
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
         self._slides_every, self._frames_to_rest = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
+        self._again = 1.0 - (1.0 - walls.packing) ** (1.0 / (PUSHED * rate))
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
@@ -148,7 +151,7 @@ class CarvedGround:
         window = part.window
         cells, channels = self._read(window)
         bodies = _lowest(parts, window)
-        cells.cut(np.maximum(part.underside, channels[2]), part.way, self._walls.packing, bodies)
+        cells.cut(np.maximum(part.underside, channels[2]), part.way, self._walls.packing, bodies, again=self._again)
         if round(frame) % self._slides_every == 0:
             cells.slide(self._walls, bodies < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
         self._write(part.step, window, cells, channels, frame)

@@ -130,7 +130,9 @@ class CarvedCells:
         self.loose += np.maximum(after - before, 0.0)
         self.pressed = pressed
 
-    def cut(self, underside: Array, way: Array, packing: float, bodies: Array | None = None) -> None:
+    def cut(
+        self, underside: Array, way: Array, packing: float, bodies: Array | None = None, *, again: float | None = None
+    ) -> None:
         """Cut the ground to a body's underside.
 
         Parameters
@@ -143,6 +145,8 @@ class CarvedCells:
             See `Walls`.
         bodies : (rows, columns) float array, optional
             Lowest surface of all bodies, if there are others: nothing is laid in them [m].
+        again : float, optional
+            Part of the loose matter that is packed, if not as much: what is pushed ahead is cut again at each frame.
         """
         standing = self.standing
         depth = standing + self.loose - underside
@@ -154,8 +158,8 @@ class CarvedCells:
         self.loose -= of_loose
         self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
         self.cut_height += float(of_standing.sum())
-        self.packed += packing * float(depth.sum())
-        thrown = (1.0 - packing) * depth
+        thrown = (1.0 - packing) * of_standing + (1.0 - (packing if again is None else again)) * of_loose
+        self.packed += float((depth - thrown).sum())
         if not thrown.any():
             return
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
