@@ -119,15 +119,19 @@ class CarvedGround:
             self._pressing.remove(step)
             step.release()
 
-    def drawn(self, step: CarvedStep, around: Array, triangles: Indices) -> Drawn | None:
-        """A part of a body over a frame, from its vertices (4, V, 3) around that span; None if it is in no ground."""
+    def low(self, around: Array) -> Mask:
+        """Vertices (4, V, 3) around a frame that come near the ground in it, (V,); none of a body that is nowhere."""
         if not np.isfinite(around).all():
-            return None
+            return np.zeros(around.shape[1], dtype=bool)
         both = around[1:3]
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low = (over < self._highest).any(axis=0)
+        low: Mask = (over < self._highest).any(axis=0)
+        return low
+
+    def drawn(self, step: CarvedStep, around: Array, low: Mask, triangles: Indices) -> Drawn | None:
+        """A part of a body over a frame, from its vertices (4, V, 3) around it, and which are low; None if none are."""
         triangles = triangles[low[triangles].any(axis=1)]
         if not len(triangles):
             return None

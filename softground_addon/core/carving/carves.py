@@ -99,10 +99,11 @@ def carves_of(
         drawn = []
         for body in bodies:
             around = next(body.poses)
+            low = carving.low(around)
             for step, left, triangles in body.parts(number):
                 if left is not None:
                     carving.leave(left)
-                if step.is_deep and (part := carving.drawn(step, around, triangles)) is not None:
+                if step.is_deep and (part := carving.drawn(step, around, low, triangles)) is not None:
                     drawn.append(part)
         for part in drawn:
             carving.carve(part, drawn, frame)
