@@ -111,7 +111,7 @@ def test_what_is_carved_follows_neither_from_the_cells_nor_from_the_frame_rate(a
         scene.softground.cell_size = cell
         carved[cell, rate] = bake(scene)[0]["totals"]["carved_m3"]
     print(f"\n{carved}")
-    assert list(carved.values()) == pytest.approx([carved[CELL, 24]] * len(carved), rel=0.03)
+    assert list(carved.values()) == pytest.approx([np.mean(list(carved.values()))] * len(carved), rel=0.03)
 
 
 def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scene, skins):
