@@ -94,10 +94,10 @@ def carves_of(
     carving = CarvedGround(ground, walls, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
     bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
-        yield
         carving.press(since, frame)
         drawn = []
         for body in bodies:
+            yield
             around = next(body.poses)
             low = carving.low(around)
             for step, left, triangles in body.parts(number):
@@ -106,6 +106,7 @@ def carves_of(
                 if step.is_deep and (part := carving.drawn(step, around, low, triangles)) is not None:
                     drawn.append(part)
         for part in drawn:
+            yield
             carving.carve(part, drawn, frame)
         carving.settle(drawn, frame)
     for step in steps.values():
