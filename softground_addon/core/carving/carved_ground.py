@@ -15,6 +15,7 @@ from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import TILE, SampledGrid, Window
 from ..ground.variation import VariationTiles
 from ..numerics.interpolation import cubic
+from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
@@ -31,7 +32,8 @@ SLIDES_EVERY, SWEEPS = 1 / 8, 8
 PUSHED = 1 / 24
 """Time in which loose matter that is pushed along is packed as much as what stood is by the first cut [s]."""
 SETTLING, SWEEPS_TO_SETTLE = 1 / 8, 96
-"""It comes to rest once the leg is on its way to its next step, within this time [s], in at most so many sweeps."""
+"""It comes to rest once the leg is on its way to its next step, within this time [s], in at most so many sweeps;
+without cohesion, in as many as it takes."""
 LEAST = round(3e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 3 mm."""
 THIN = 2e-3
@@ -167,15 +169,20 @@ class CarvedGround:
 
     def settle(self, parts: Sequence[Drawn], frame: float) -> None:
         """Let what steps have carved slide on around the parts of bodies; at the end, all of it is recorded."""
+        holds = self._walls.strength > 0
+        sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
         for step, frames in list(self._settling.items()):
             window = step.recorder.window
             cells, _ = self._read(window)
             window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
             cells, channels = self._read(window)
+            if not holds and frames == self._frames_to_rest:
+                cells.gather(channels[7] * QUANTUM, THIN)  # then its edges slide as well
             body = _lowest(parts, window) < cells.surface + self._cell_size
-            cells.slide(self._walls, body, (window.row, window.column), ceil(SWEEPS_TO_SETTLE / self._frames_to_rest))
-            if frames == 1:
+            cells.slide(self._walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
+            if holds and frames == 1:
                 cells.gather(channels[7] * QUANTUM, THIN)
+            if frames == 1:
                 del self._settling[step]
             else:
                 self._settling[step] = frames - 1

@@ -11,6 +11,8 @@ from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
 from softground_addon.core.carving import carves
+from softground_addon.core.ground.sparse_grid import TILE, Window
+from softground_addon.core.pressing.repose import NEIGHBOURS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
@@ -137,6 +139,26 @@ def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scen
     for number, carve in left.carves.items():
         assert np.array_equal(again[number].tile(again[number].rim, 20.5), carve.tile(carve.rim, 20.5))
         assert np.array_equal(again[number].tile(again[number].compression), carve.tile(carve.compression))
+
+
+def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
+    armature = walker(scene)
+    bpy.ops.softground.load_preset(name="Dry Sand")
+    options = scene.softground
+    options.cell_size, options.material.layer_depth, options.material.youngs_modulus = CELL, 0.6, 250e3
+    report, left = bake(scene)
+    assert report["carved"][armature.name]["cut_m3"] > 1e-3
+    field = recompose(left.shaping)
+    tiles = np.array(list(field.tiles))
+    (column, row), (columns, rows) = tiles.min(axis=0) * TILE, (np.ptp(tiles, axis=0) + 1) * TILE
+    window = Window(int(column), int(row), int(columns), int(rows))
+    compression, rim = field.read(window)
+    places = np.stack(np.meshgrid(*window.centres(CELL)), axis=-1)
+    lasts = [step.position[:2] for step in left.footprints[-2:]]
+    at_rest = np.min([np.linalg.norm(places - last, axis=-1) for last in lasts], axis=0) > 0.7
+    for one, other, way in NEIGHBOURS:
+        slope = np.abs((rim - compression)[one] - (rim - compression)[other]) / (CELL * np.hypot(*way))
+        assert np.degrees(np.arctan(slope[at_rest[one] & at_rest[other]].max())) < 33.0
 
 
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
