@@ -224,7 +224,7 @@ class BakeSettings(SceneUnits):
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
-    carve: bool = field(default=False, metadata={**UNSAID, **_on(Acts.RESPONDING)})
+    carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
 
     @property

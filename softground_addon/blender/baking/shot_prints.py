@@ -87,11 +87,12 @@ def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Map
 
 def _source(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[str]:
     """A hash of all that the prints follow from; empty where they are of no mesh, or of more than can be compared."""
-    if wanted.carves or not isinstance(ground.terrain, MeshTerrain):
+    if not isinstance(ground.terrain, MeshTerrain):
         return ""
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
     still = replace(ground, weathering=None)  # which the settings have
-    hashing = report.hash_inputs.slices(before, after, shot.motions, still, edits)
+    skins = shot.skins if wanted.carves else {}
+    hashing = report.hash_inputs.slices(before, after, shot.motions, still, edits, skins)
     return (yield from meanwhile(Progress("simulate", 0.0), hashing))
 
 

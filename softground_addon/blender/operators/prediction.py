@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
 from ...core.composers.prediction import matching_modulus, next_modulus
 from ...core.errors import InputError
+from ...core.ground.deep_ground import wading
+from ...core.loads.cell_limits import Fineness
+from ...core.motion.motion import shortest_sole
 from ...core.settings import BakeSettings
 from .. import jobs, session, settings
 from ..live import live
@@ -67,6 +70,13 @@ def of(scene: bpy.types.Scene) -> DepthPrediction | None:
 def asked(scene: bpy.types.Scene) -> BakeSettings:
     """The settings of a scene as panels and overlay are drawn."""
     return _look(scene)[0]
+
+
+def fineness(scene: bpy.types.Scene, predicted: DepthPrediction) -> Fineness:
+    """Fineness of the bake to come, with what legs will carve at the depth to expect."""
+    wanted = asked(scene)
+    length = shortest_sole([character.motion for character in predicted.analysis.loads])
+    return replace(wanted.fineness, is_carved=wanted.carves and bool(wading(predicted.depth or 0.0, length) > 0))
 
 
 def look_anew() -> None:

@@ -313,8 +313,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     carve: BoolProperty(
         name="Carve",
         description="Let legs and whatever else is in the ground carve it, where feet that are sunk go deeper than the "
-        "ankle. The bake takes two to three times as long",
-        default=False,
+        "ankle. The bake of such a shot takes three to five times as long",
+        default=True,
     )
     has_layers: BoolProperty(
         name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}

@@ -1,8 +1,8 @@
 """Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
 
 Over the pressed ground T, every cell keeps the lowest underside K that passed it and the loose matter l on it: what
-stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. Of what stood, a part is packed into
-the wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
+stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. A part of it all is packed into the
+wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
 
 References
@@ -28,13 +28,15 @@ Mask = NDArray[np.bool_]
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
 UNDER_SOLE = 0.01
-"""The same of a sole that presses: within it the print is what the solver says, and the skin about that [m]; where the
-soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+"""The same of a sole that presses, or a cell if that is less: within it the print is what the solver says, and the skin
+about that [m]; where the soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
+THICKEST, LAYERS = 0.04, 3
+"""Loose matter is laid up to this thickness [m], and under what hovers over it, in so many goes; then anywhere."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
-REACH = 0.05
+REACH = 0.04
 """How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
 
 
@@ -128,7 +130,9 @@ class CarvedCells:
         self.loose += np.maximum(after - before, 0.0)
         self.pressed = pressed
 
-    def cut(self, underside: Array, way: Array, packing: float) -> None:
+    def cut(
+        self, underside: Array, way: Array, packing: float, bodies: Array | None = None, *, again: float | None = None
+    ) -> None:
         """Cut the ground to a body's underside.
 
         Parameters
@@ -139,10 +143,14 @@ class CarvedCells:
             Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
         packing : float
             See `Walls`.
+        bodies : (rows, columns) float array, optional
+            Lowest surface of all bodies, if there are others: nothing is laid in them [m].
+        again : float, optional
+            Part of the loose matter that is packed, if not as much: what is pushed ahead is cut again at each frame.
         """
         standing = self.standing
         depth = standing + self.loose - underside
-        depth[self.closed | (depth < np.where(self.contact, UNDER_SOLE, TOLERANCE))] = 0.0
+        depth[self.closed | (depth < np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))] = 0.0
         if not depth.any():
             return
         of_loose = np.minimum(self.loose, depth)
@@ -150,16 +158,24 @@ class CarvedCells:
         self.loose -= of_loose
         self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
         self.cut_height += float(of_standing.sum())
-        self.packed += packing * float(of_standing.sum())
-        thrown = of_loose + (1.0 - packing) * of_standing
+        thrown = (1.0 - packing) * of_standing + (1.0 - (packing if again is None else again)) * of_loose
+        self.packed += float((depth - thrown).sum())
         if not thrown.any():
             return
-        free = ~(self.closed | self.contact) & (underside > self.surface + TOLERANCE)
-        spread = np.where(free, _around(thrown, way, self.cell_size), 0.0)
-        if (there := spread.sum()) > 0:
-            self.loose += spread * (thrown.sum() / there)
-        else:
-            self.unplaced += float(thrown.sum())
+        laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
+        under_body = (underside if bodies is None else bodies) - self.surface - TOLERANCE
+        remaining = float(thrown.sum())
+        for most in (np.minimum(under_body, THICKEST - self.loose), under_body):
+            room = np.maximum(most, 0.0)
+            for _ in range(LAYERS):
+                share = laid * (room > 0)
+                if remaining <= ROUNDING or not (there := share.sum()):
+                    break
+                more = np.minimum(share * (remaining / there), room)
+                self.loose += more
+                room -= more
+                remaining -= float(more.sum())
+        self.unplaced += remaining if remaining > ROUNDING else 0.0
 
     def pack(self) -> None:
         """Pack the loose matter under soles that press."""

@@ -81,6 +81,8 @@ class RespondedSkin:
     ----------
     frames : (F,) float array
         Scene frames.
+    frame_rate : float
+        Frames per second [Hz].
     jumps : tuple of int
         Samples at which the body is elsewhere than before, as at a cut.
     triangles : mapping of int to (T, 3) int array
@@ -89,7 +91,8 @@ class RespondedSkin:
 
     def __init__(self, worn: WornSkin, motion: CharacterMotion, response: Response) -> None:
         self._worn = worn
-        self.frames, self.jumps = motion.frames, tuple(motion.starts[1:].tolist())
+        self.frames, self.frame_rate = motion.frames, motion.frame_rate
+        self.jumps = tuple(motion.starts[1:].tolist())
         recorded = vars(worn.recording)
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
         body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)

@@ -75,14 +75,16 @@ class Window(NamedTuple):
         row, column = part.row - self.row, part.column - self.column
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
+    def intersection(self, other: Window) -> Window | None:
+        """The cells that both hold; None if none."""
+        column, row = max(self.column, other.column), max(self.row, other.row)
+        columns = min(self.column + self.columns, other.column + other.columns) - column
+        rows = min(self.row + self.rows, other.row + other.rows) - row
+        return Window(column, row, columns, rows) if columns > 0 and rows > 0 else None
+
     def intersects(self, other: Window) -> bool:
         """Return whether the two share a cell."""
-        return (
-            self.column < other.column + other.columns
-            and other.column < self.column + self.columns
-            and self.row < other.row + other.rows
-            and other.row < self.row + self.rows
-        )
+        return self.intersection(other) is not None
 
     def refined(self, factor: int) -> Window:
         """The same rectangle in cells that are `factor` times smaller."""

@@ -9,13 +9,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
-from .wading import depth_of_contacts, ploughed
+from .wading import depth_of_contacts, dragged, ploughed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -185,9 +186,13 @@ def place_sole(
         needed = np.where(touching, needed + clearance, needed)
     stands = touching & np.isfinite(on_top)
     sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
-    lift = between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
-    missing = needed - lift - ploughed(depth_of_contacts(sinkage, touching), sole.sole.length)
-    lift += _swing_clearance(missing, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
+    depth, clear_time = depth_of_contacts(sinkage, touching), CLEAR_TIME * motion.adult_second
+    level = wading(depth, sole.sole.length)
+    lift = between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True, level=level)
+    ploughs = ploughed(depth, sole.sole.length)
+    lift += _swing_clearance(needed - lift - ploughs, touching, max(1, round(clear_time)))
+    if (drags := dragged(depth, sole.sole.length)).any():
+        lift -= drags * _swing_lowered(lift - on_top + ploughs, touching, clear_time)
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change
@@ -272,12 +277,14 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
     return posed
 
 
-def between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> Array:
+def between_contacts(values: Array, touching: Mask, *, upward: bool = False, level: Array | float = 0.0) -> Array:
     """Values (F,) or (F, N) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
 
     With `upward`, a value that falls at the end of a contact or will rise after the start of one does not go on so
-    between them: a foot leaves its print upward and comes down on the next.
+    between them: a foot leaves its print upward and comes down on the next. Where it is `level`, (F,) from 0 to 1, it
+    does not come down as fast as it sinks then: in deep ground that is sudden.
     """
+    level = np.broadcast_to(level, len(values))
     starts, ends = runs(touching)
     result = values.copy()
     result[: starts[0]] = values[starts[0]]
@@ -290,7 +297,7 @@ def between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> 
         after = (values[first + 1] - b) * gap if first + 1 < len(values) and touching[first + 1] else 0.0
         steepest = 1.5 * np.maximum(np.abs(b - a), 1e-3)
         before = np.clip(before, 0.0 if upward else -steepest, steepest)
-        after = np.clip(after, -steepest, 0.0 if upward else steepest)
+        after = np.clip(after, -steepest, 0.0 if upward else steepest) * (1.0 - level[first])
         result[last + 1 : first] = a + u * (
             before + u * (3 * (b - a) - 2 * before - after + u * (2 * (a - b) + before + after))
         )
@@ -304,6 +311,12 @@ def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
     distance = _frames_from_contact(touching)
     extra[~touching] = (wanted * smooth_step(distance / (reach + 1)))[~touching]
     return extra
+
+
+def _swing_lowered(spare: Array, touching: Mask, time: float) -> Array:
+    """How far a foot that ploughs swings lower (F,) [m]: by what is to spare, 0 at contacts."""
+    distance = _frames_from_contact(touching) - 0.5  # between the frames
+    return np.where(np.isfinite(spare), np.maximum(spare, 0.0), 0.0) * smooth_step(distance / time)
 
 
 def _frames_from_contact(touching: Mask) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ def leaving_early(motion: CharacterMotion, touching: Mask, footprints: Sequence[
         for first, end in zip(*runs(touching[:, number]), strict=True):
             since, until = motion.frames[first], motion.frames[end - 1]
             depth = max((m.max_depth_m for m in prints if m.start_frame <= until and m.end_frame >= since), default=0.0)
-            early = round(LEAVE_TIME * motion.adult_second * float(wading(depth, sole.length)))
+            early = floor(LEAVE_TIME * motion.adult_second * float(wading(depth, sole.length)))  # half a frame ended it
             last = np.arange(max(first + 1, end - early), min(end, len(touching) - 1))
             standing[last[np.logical_and.accumulate(others[last][::-1])[::-1]], number] = False
     return standing

@@ -250,11 +250,22 @@ def test_the_cells_to_expect_are_those_that_a_bake_prints(shot):
     coverage = Coverage(0.4, 0.0, np.zeros((0, 2)), np.zeros(0, int))
     assert ground_options_panel.estimate(coverage, Fineness(0.01, 0.04)) == "About 4,000 cells, 14 MB, 1 seconds"
     assert ground_options_panel.estimate(coverage, Fineness(0.002, 0.04)) == "About 100,000 cells, 100 MB, 4 seconds"
+    carved = Fineness(0.002, 0.04, is_carved=True)
+    assert ground_options_panel.estimate(coverage, carved) == "About 100,000 cells, 550 MB, 21 seconds"
     close = Fineness(0.01, 0.04, "CLOSE_UP", 2_000_000)
     assert ground_options_panel.estimate(coverage, close) == "About 4,000 cells, 68 MB, 2 seconds"
     assert ground_options_panel.vertices(192_000, 2_000_000) == "About 190,000 vertices along the whole trail"
     over = "About 190,000 vertices along the whole trail, over Max Vertices"
     assert ground_options_panel.vertices(192_000, 100_000) == over
+
+
+def test_a_bake_is_expected_to_carve_where_feet_sink_beyond_the_ankle(shot):
+    material = shot.softground.material
+    shot.softground.sink_feet, material.layer_depth = True, 0.6
+    for modulus, carves in ((123e3, True), (3e6, False)):
+        material.youngs_modulus = modulus
+        bpy.ops.softground.predict_depth()
+        assert prediction.fineness(shot, prediction.of(shot)).is_carved == carves
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):

@@ -26,22 +26,29 @@ def holes(depth):
     return Ground(height)
 
 
-def deepest_swing(depth):
-    """How far below the surface a foot of the walk swings half way between two prints [m]."""
+def swings(depth):
+    """How far below the surface the feet of the walk swing half way between two prints, (F,) each [m]."""
     motion, touching = walk()
     _, moved = grounded(motion, touching, holes(depth), FLAT)
-    found = []
     for index, sole in enumerate(moved.soles):
         points = posed_points(sole)
         between = ~touching[:, index] & (holes(depth).heights(points[..., 0], points[..., 1]) == 0.0).all(axis=1)
-        found.append(-points[between, :, 2].min())
-    return max(found)
+        yield -points[between, :, 2].min(axis=1)
+
+
+def deepest_swing(depth):
+    return max(below.max() for below in swings(depth))
 
 
 def test_a_foot_ploughs_through_deep_ground_no_deeper_than_it_may_and_lifts_over_shallow_ground():
     shallow, deep = deepest_swing(0.06), deepest_swing(0.35)
     assert shallow < -0.02, "it stays above the surface"
     assert 0.05 < deep < ploughed(0.35, FOOT_LENGTH) + 0.03
+
+
+def test_a_foot_is_dragged_through_a_layer_as_deep_as_its_ankle_and_a_half_all_the_way():
+    for below in swings(0.15):
+        assert below == pytest.approx(np.full(len(below), ploughed(0.15, FOOT_LENGTH)), abs=0.01)
 
 
 def test_a_deeper_layer_is_ploughed_deeper_but_in_a_lesser_part_and_no_shallow_one_is():
