@@ -33,7 +33,11 @@ def kinds(of=ModalJob):
 
 @pytest.fixture
 def press(scene, monkeypatch):
-    """A way to press a button, and to let its job run to its end; what came of it and how often it gave way."""
+    """A way to press a button, and to let its job run to its end; what came of it and how often it gave way.
+
+    It does so after each slice of its work, however fast the machine is.
+    """
+    monkeypatch.setattr(modal_job, "TICK", 0.0)
 
     # There are no events in background, where Blender never calls `invoke`: this is what that does in a window.
     def pressed(name, **values):
