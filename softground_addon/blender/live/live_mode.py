@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.carving.carved_step import is_deep
 from ...core.composers.playhead import Playhead, footprints_of
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.errors import InputError
@@ -265,6 +266,8 @@ class LiveMode:
             made_with = with_shoe_treads(made_with, shot.motions)
         movers, name = staleness.of_movers(scene, made_with), settings.name_of(ground)
         footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
+        if made_with.carves and any(map(is_deep, footprints)):
+            made_with = replace(made_with, carve=False)  # which takes a bake
         yield now
         vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))

@@ -140,6 +140,17 @@ def test_kept_prints_say_which_frames_they_are_of(live_shot):
     assert bake_report.stale_reasons(live_shot) == ()
 
 
+@pytest.mark.parametrize(("softer", "sinks", "outdated"), [(30, True, True), (30, False, False), (1, True, False)])
+def test_kept_prints_are_outdated_where_a_bake_would_carve_too(live_shot, softer, sinks, outdated):
+    options = live_shot.softground
+    options.sink_feet = sinks
+    options.material.layer_depth, options.frame_end = 0.6, 30
+    options.material.youngs_modulus /= softer
+    live_shot.frame_set(30)
+    bpy.ops.softground.live(keep=True)
+    assert bool(bake_report.stale_reasons(live_shot)) == outdated
+
+
 def test_kept_prints_are_pressed_with_the_settings_that_they_are_stamped_with(live_shot):
     """Also those that were changed a moment before, and had not shown yet."""
     material, options = live_shot.softground.material, live_shot.softground

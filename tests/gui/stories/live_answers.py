@@ -16,6 +16,7 @@ FRAME = 150
 def tell(hand: Hand, facts: dict) -> Steps:
     open_walk(FRAME)
     yield from on_new_ground(hand)
+    scene().softground.carve = False  # live mode shows prints alone
     yield 0.5
     yield from hand.look_at_walk()
     yield from press_live(hand)
