@@ -22,6 +22,7 @@ from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
 from ..numerics.smoothing_spline import smooth_path
 from ..skin import bearing
+from .clearances import clearances
 
 if TYPE_CHECKING:
     from ..ground.heightfield import Terrain
@@ -56,8 +57,6 @@ FLOAT_LIMIT = 0.15
 """A sole that never comes nearer than this to its ground does not float, it does not touch, in leg lengths."""
 SHORTEST_CONTACT = 0.165
 """Gaps and blips shorter than this close, in sqrt(leg length/gravity) (0.05 s for an adult)."""
-STEEPEST_GROUND = np.cos(np.radians(60.0))
-"""Vertical part of the normal of the steepest ground that bears a sole: more is a wall."""
 EDGE_SEARCH = 0.2
 """How far toe-off may lie from the instant that height and speed tell, in sqrt(leg length/gravity) (60 ms)."""
 EDGE_CUTOFF = 24.0
@@ -76,6 +75,8 @@ BESIDE = 0.33
 later it then may, in sqrt(leg length/gravity) (0.1 s)."""
 SWING = 2.0
 """Time in which a swinging foot has been at its fastest, in the same unit (0.6 s)."""
+SURE = 0.6
+"""Share of the time for which the skin of a sole bears, of which its speed tells less where it tells nothing."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 
@@ -173,11 +174,20 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contact
 
 
 def _shown(touching: Mask, seen: Contacts) -> Mask:
-    """What touches by its speed, without what the skin shows in the air, and without the contacts in which the skin of
-    a sole never bears that bears at other times; but for those that an end of the shot cuts, where the sole is as low
-    as when it bears: there the skin shows less."""
+    """What touches by its speed, or by its skin where feet tremble or slide too fast for their speed to tell.
+
+    Left out is what the skin shows in the air, and contacts in which the skin of a sole never bears that bears at other
+    times; but for those that an end of the shot cuts, where the sole is as low as when it bears: there the skin shows
+    less.
+    """
     shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
     for sole in np.flatnonzero(seen.touching.any(axis=0)):
+        for first, last in zip(*runs(seen.touching[:, sole]), strict=True):
+            told = np.flatnonzero(shown[first:last, sole])
+            if len(told):  # it does not leave and land again while its skin bears on
+                shown[first + told[0] : first + told[-1], sole] = True
+            if shown[first:last, sole].mean() < SURE:
+                shown[first:last, sole] = True
         bears, clearance = seen.touching[:, sole], seen.clearance[:, sole]
         low = clearance[bears].max()
         for first, last in zip(*runs(shown[:, sole]), strict=True):
@@ -207,44 +217,6 @@ def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track
     clearance -= offset
     aloft = clearance > bearing.LEAVE * motion.skin.height if motion.skin else None
     return Contacts(touching, np.full(len(tracks), offset), normal, clearance, aloft)
-
-
-def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:
-    """Unit normals of the terrain at positions of any shape (...,), from central differences over ±reach [m].
-
-    Returns
-    -------
-    (..., 3) float array, NaN where the ground is missing.
-    """
-    slope_x = (terrain.heights(x + reach, y) - terrain.heights(x - reach, y)) / (2 * reach)
-    slope_y = (terrain.heights(x, y + reach) - terrain.heights(x, y - reach)) / (2 * reach)
-    normal = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-
-
-def clearances(points: Array, terrain: Terrain, *, reach: float) -> tuple[Array, Array]:
-    """Distances of a sole's landmarks from the ground, measured along its normal.
-
-    Parameters
-    ----------
-    points : (N, L, 3) float array
-        World positions of the landmarks [m].
-    terrain : Terrain
-    reach : float
-        Half the distance over which the ground's slope is read [m].
-
-    Returns
-    -------
-    clearance : (N, L) float array [m]
-        Infinite where the ground is missing or too steep to stand on.
-    normal : (N, L, 3) float array
-        The ground's unit normal, vertical where there is none.
-    """
-    x, y, z = np.moveaxis(points, -1, 0)
-    normal = ground_normal(terrain, x, y, reach=reach)
-    clearance = (z - terrain.heights(x, y)) * normal[..., 2]
-    bears = np.isfinite(clearance) & (normal[..., 2] >= STEEPEST_GROUND)
-    return np.where(bears, clearance, np.inf), np.where(np.isfinite(normal), normal, (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)

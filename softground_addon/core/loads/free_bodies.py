@@ -21,7 +21,8 @@ from ..motion.props import posed
 from ..motion.sole_motion import SoleMotion
 from ..numerics.interpolation import linear
 from ..numerics.intervals import hysteresis, runs
-from .contacts import Contacts, ground_normal
+from .clearances import ground_normal
+from .contacts import Contacts
 from .forces import UP, ContactForces
 
 Array = NDArray[np.float64]

@@ -75,3 +75,11 @@ def test_a_walk_on_the_spot_is_one_however_slow_it_is(addon, size, period):
 def test_toes_and_knees_are_those_of_their_own_leg_where_several_have_such_names(addon):
     """Middle legs are named as the others are but for a word that tells no part of a body."""
     assert not misses(replace(Animal.drawn(3), legs=6, foot="free", names="named", toes=True))
+
+
+def test_feet_that_tremble_and_slide_print_while_their_skin_stands(addon):
+    """As a network or a capture without a filter leaves them: their speed does not tell when they stand."""
+    large = replace(Animal.drawn(1208), legs=4, size=5.8, unit=1.0, rate=120, period=2.57, duty=0.64, stride=0.3)
+    for seed in range(2):
+        animal = replace(large, skates=0.066, trembles=0.0017, offset=0.234, seed=seed)
+        assert not [miss for miss in misses(animal) if "GROSS" in miss]
