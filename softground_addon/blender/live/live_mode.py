@@ -267,7 +267,7 @@ class LiveMode:
         movers, name = staleness.of_movers(scene, made_with), settings.name_of(ground)
         footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
         if made_with.carves and any(map(is_deep, footprints)):
-            made_with = replace(made_with, carve=False)  # which takes a bake
+            made_with = replace(made_with, carve=False)  # live mode carves nothing
         yield now
         vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))

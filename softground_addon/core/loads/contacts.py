@@ -76,7 +76,7 @@ later it then may, in sqrt(leg length/gravity) (0.1 s)."""
 SWING = 2.0
 """Time in which a swinging foot has been at its fastest, in the same unit (0.6 s)."""
 SURE = 0.6
-"""Share of the time for which the skin of a sole bears, of which its speed tells less where it tells nothing."""
+"""Share of a contact that the skin shows, of which speed has to find as much or more; else the skin decides."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 

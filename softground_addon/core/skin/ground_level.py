@@ -17,7 +17,7 @@ OFTEN = 20.0
 AROUND = 0.5
 """Time to either side over which that is looked for [s]: a stride of a run."""
 WORTH = 0.3
-"""A part that rests at a level by more than this does."""
+"""Membership of a level beyond which a part counts as resting on it."""
 FURTHER_PART = 0.15
 """Addition of a further part that rests at a level to a moment's vote for it."""
 SUNK = 0.08
