@@ -34,14 +34,16 @@ CELLS_ALONG_SOLE = 60
 """Finer cells show the same depths, to a hundredth."""
 MOST_STEPS = 320
 """Steps that a longer contact is pressed in: 2.7 s, at the usual 120 a second."""
-SAMPLE = 5
-"""Contacts around the median that are pressed into another material, ..."""
+SAMPLE, FEW = 11, 5
+"""Contacts around the median that are pressed into another material, fewer where they are alike, ..."""
 BENEATH = 11
 """... and earlier ones, on which they tread."""
 STEPS_AT_ONCE, BODY_STEPS_AT_ONCE = 48, 1
 """Steps of a foot and of a body that are pressed in a slice."""
 MATCH_TOLERANCE, CLOSE_ENOUGH, CERTAIN = 1e-2, 5e-3, 4e-2
 """Relative error of a matched depth of the middle contacts, and of all; and of all where one more guess suffices."""
+ALIKE = 0.03
+"""Relative difference of depths by which contacts are alike."""
 FREE_TRIALS, MOST_TRIALS = 8, 40
 """Moduli that are tried before their interval is halved, and in all."""
 LEAST_POWER, MOST_POWER = 0.1, 3.0
@@ -163,12 +165,19 @@ def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotCon
     impulse = np.array([contact.impulse for contact in contacts])[asked]
     typical = asked[typical_contacts(depths[asked], impulse)]
     among = typical if len(typical) else asked[main_contacts(impulse)]
-    beside = max(0, (len(among) - SAMPLE) // 2)
-    sample = among[np.argsort(depths[among], kind="stable")][beside : len(among) - beside].tolist()
-    beneath = _beneath(contacts, sample, prints)
-    for number in sample + beneath:
+    sample = _middle(among[np.argsort(depths[among], kind="stable")], SAMPLE)
+    if len(sample) > FEW and np.ptp(depths[sample]) <= ALIKE * depths[sample].mean():
+        sample = _middle(sample, FEW)
+    beneath = _beneath(contacts, sample.tolist(), prints)
+    for number in [*sample, *beneath]:
         contacts[number].layout.remembers = True
-    return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample, beneath)
+    return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample.tolist(), beneath)
+
+
+def _middle(ordered: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """As many of the ordered numbers from their middle, or one more."""
+    beside = max(0, (len(ordered) - count) // 2)
+    return ordered[beside : len(ordered) - beside]
 
 
 def _press(contacts: Sequence[_Contact], chosen: Iterable[int], ground: SoftGround) -> Slices[dict[int, Footprint]]:
@@ -239,7 +248,7 @@ def matching_modulus(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and that of the layer when "
             f"packed, {material.deepest * 100:.3g} cm."
         )
-    middle = contacts.sample[(len(contacts.sample) - 1) // 2 : len(contacts.sample) // 2 + 1]
+    middle = _middle(np.array(contacts.sample, int), 1).tolist()
     few, pressed = replace(contacts, sample=middle, beneath=[]), contacts.ground.material
     tried = []
     if contacts.ground.pressure == pressure and pressed == replace(material, youngs_modulus=pressed.youngs_modulus):
