@@ -45,6 +45,22 @@ class SOFTGROUND_UL_soles(Listed):
         layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
 
 
+class SOFTGROUND_UL_joints(Listed):
+    """Joints of a body, each with its bone; those that have none stand out."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        split = layout.split(factor=0.45)
+        split.label(text=_joint_label(item.name), icon="BONE_DATA" if item.bone else "ERROR", translate=False)
+        split.label(text=item.bone, translate=False)
+
+    def filter_items(self, _context: Any, data: Any, name: Any) -> Any:
+        """Sort them from the hips outward."""
+        place = {joint: number for number, joint in enumerate(JOINTS)}
+        joints = [place.get(joint.name, len(place)) for joint in getattr(data, name)]
+        order = sorted(range(len(joints)), key=joints.__getitem__)
+        return [], [order.index(number) for number in range(len(joints))]
+
+
 class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
     """Characters that leave footprints"""
 
@@ -195,23 +211,13 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
         character = active_character(settings.options_of(context))
         layout.prop(character, "armature")
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
-        column = layout.column(align=True)
-        order = {joint: place for place, joint in enumerate(JOINTS)}
-        for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
-            split = column.split(factor=0.3, align=True)
-            name = split.row()
-            name.alignment = "RIGHT"
-            name.label(text=_joint_label(joint.name), translate=False)
-            row = split.row(align=True)
-            row.use_property_split = False
-            row.prop_search(joint, "bone", character.armature.data, "bones", text="")
-            end = row.row(align=True)
-            end.ui_units_x = _END_WIDTH
-            end.prop(joint, "end", text="")
-
-
-_END_WIDTH = 4.8
-"""Width of a bone's end, in units of the interface: the bone has the rest."""
+        layout.template_list(
+            "SOFTGROUND_UL_joints", "", character, "joints", character, "active_joint", rows=5, maxrows=len(JOINTS)
+        )
+        if 0 <= character.active_joint < len(character.joints):
+            joint = character.joints[character.active_joint]
+            layout.prop_search(joint, "bone", character.armature.data, "bones")
+            layout.prop(joint, "end")
 
 
 def _joint_label(joint: str) -> str:
@@ -365,6 +371,7 @@ def _changing_ground(layout: Any, options: Any) -> None:
 CLASSES = (
     SOFTGROUND_UL_characters,
     SOFTGROUND_UL_soles,
+    SOFTGROUND_UL_joints,
     SOFTGROUND_PT_character,
     SOFTGROUND_PT_ground,
     SOFTGROUND_PT_bake,
