@@ -15,7 +15,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
+from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.debris import debris_object, debris_shapes
@@ -557,10 +557,12 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     corners[:] = (world[vertex, :2] - middle) / side + 0.5
     ground.data.uv_layers.new(name="Square").uv.foreach_set("vector", corners.ravel())
     scene.frame_set(5)
-    paths = image_exports.export_images(scene, ground, tmp_path, 20, 20, resolution=resolution, uv_map="Square")
+    paths = image_exports.export_images(
+        ground, tmp_path, 20, 20, units=settings.units_of(scene), resolution=resolution, uv_map="Square"
+    )
     for early in (1, 8):
         paths += image_exports.export_images(
-            scene, ground, tmp_path, early, early, resolution=resolution, uv_map="Square"
+            ground, tmp_path, early, early, units=settings.units_of(scene), resolution=resolution, uv_map="Square"
         )
     assert {path.stem.split("_")[-2] for path in paths} == {"displacement", "mask", "debris"}
     assert image_exports.kinds_of(ground) == ("displacement", "mask", "debris")
@@ -593,7 +595,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
 def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()
-    exports.export_usd(scene, ground, tmp_path / "shot.usda", 8, 20)
+    exports.export_usd(ground, tmp_path / "shot.usda", 8, 20)
     assert fingerprints.of_file() == before
     text = (tmp_path / "shot.usda").read_text(encoding="utf-8")
     has_clouds = compat.WRITES_CLOUDS
@@ -615,7 +617,7 @@ def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
 def test_alembic_carries_debris_as_points_with_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()
-    exports.export_alembic(scene, ground, tmp_path / "shot.abc", 8, 20)
+    exports.export_alembic(ground, tmp_path / "shot.abc", 8, 20)
     assert fingerprints.of_file() == before
     there = set(bpy.data.objects)
     bpy.ops.wm.alembic_import(filepath=str(tmp_path / "shot.abc"), as_background_job=False)
