@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, cast
 
 import bpy
@@ -26,6 +27,9 @@ MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
 ADD_ON = __package__.rpartition(".")[0].removesuffix(".softground_addon")
 """The name by which Blender knows the add-on, which as an extension has `softground_addon` within it."""
+
+Objects = Iterable[bpy.types.Object]
+"""Objects among which some are sought, more than once: those of a scene."""
 
 STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
@@ -58,10 +62,10 @@ def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
     return [obj for obj in listed if exists(obj) and obj != options.ground]
 
 
-def forget_deleted_ground(scene: bpy.types.Scene) -> None:
+def forget_deleted_ground(options: Any) -> None:
     """Take a ground that was deleted out of the settings."""
-    if scene.softground.ground is not None and not exists(scene.softground.ground):
-        scene.softground.ground = None
+    if options.ground is not None and not exists(options.ground):
+        options.ground = None
 
 
 def typed(value: float) -> float:

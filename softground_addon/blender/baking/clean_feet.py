@@ -93,7 +93,7 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
     cleaned, feet, missed = yield from _cleaned(wanted, shot, loads)
     layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)
-    response_job.put_layers(scene, wanted, layers, LayerKind.CLEAN_FEET)
+    response_job.put_layers(scene.softground, wanted, layers, LayerKind.CLEAN_FEET)
     yield Progress("write", 1.0)
     return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
 

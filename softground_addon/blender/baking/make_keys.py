@@ -107,9 +107,9 @@ def _note_movers(scene: bpy.types.Scene) -> None:
     if ground is None or not baked_ground.is_baked(ground):
         return
     wanted = settings_of(scene)
-    soles = staleness.of_soles(scene, mesh_soles(baked_ground.edits_of(ground)))
+    soles = staleness.of_soles(scene.objects, mesh_soles(baked_ground.edits_of(ground)))
     staleness.store_again(
-        ground, staleness.stamp_of(ground), wanted.painted, staleness.of_movers(scene, wanted) | soles
+        ground, staleness.stamp_of(ground), wanted.painted, staleness.of_movers(scene.objects, wanted) | soles
     )
 
 

@@ -95,7 +95,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         for kind in LayerKind:  # the others were made for a walk on the spot
             remove_layer(armature, kind)
         layer = Layer(curves, {SPEED: f"{travel.speed:.4f}"})
-        show_layer(scene, armature, LayerKind.ROOT_MOTION, layer)
+        show_layer(scene.softground, armature, LayerKind.ROOT_MOTION, layer)
     yield Progress("write", 1.0)
     return tuple(travel for _, travel, _ in layers)
 

@@ -172,7 +172,7 @@ def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
 
 def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
     """Copies of what prints that are instances."""
-    showing = instancers(scene, staleness.bodies_of(scene, wanted))
+    showing = instancers(scene, staleness.bodies_of(scene.objects, wanted))
     return [
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())

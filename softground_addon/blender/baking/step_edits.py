@@ -129,7 +129,7 @@ def _sole_hashes(
     """Hashes of the meshes whose soles press steps, of those that were not read again as they were noted."""
     soles, before = mesh_soles(edits), mesh_soles(bake.left.edits)
     noted: dict[str, str] = json.loads(stamp) if stamp else {}
-    now = staleness.of_soles(scene, soles)
+    now = staleness.of_soles(scene.objects, soles)
     same = {f"{staleness.SOLE}:{name}" for name, sole in soles.items() if before.get(name) == sole}
     return {key: noted.get(key, value) if key in same else value for key, value in now.items()}
 

@@ -36,7 +36,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
     if not props:
         raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
     for obj in props:
-        check_printable(scene, obj)
+        check_printable(scene.softground, obj)
         for character in scene.softground.characters:
             if character.armature and character.armature in ancestors(obj):
                 raise InputError(
@@ -59,7 +59,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
         added.append(character)
         for obj in members:
             take_frames(scene, _moving_frames(scene, obj))
-        fit_ground(scene)
+        fit_ground(scene.softground)
     scene.softground.active_character = len(scene.softground.characters) - 1
     return added
 
@@ -75,7 +75,7 @@ def _guessed_mass(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> 
         if obj.rigid_body:
             total += obj.rigid_body.mass
             continue
-        vertices, triangles = surface_of(scene, obj)
+        vertices, triangles = surface_of(scene.view_layers[0], obj)
         to_world = np.array(obj.matrix_world)[:3, :3] * scene.unit_settings.scale_length
         total += mass_properties(vertices @ to_world.T, triangles).volume * DENSITY
     if not total > 0:

@@ -81,7 +81,7 @@ def recognise(
     if armature.mode == "EDIT":
         return Recognised(mapping)
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
-    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
+    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature))
     armature = found(rig)
     if armature.mode == "EDIT":
         return Recognised(mapping)

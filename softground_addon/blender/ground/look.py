@@ -16,11 +16,11 @@ from ..materials.materials import MARK, ensure_material, ensure_over
 from .baked_ground import display_mesh_of
 
 
-def follow(scene: bpy.types.Scene) -> None:
+def follow(options: Any) -> None:
     """Show the scene's surface on its ground wherever the add-on's own material is."""
-    ground = scene.softground.ground
+    ground = options.ground
     for obj in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
-        _show(obj, scene.softground.material.surface, over_theirs=False)
+        _show(obj, options.material.surface, over_theirs=False)
 
 
 def apply(ground: bpy.types.Object, surface: str) -> int:

@@ -44,7 +44,7 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
 
 
 def _added(scene: bpy.types.Scene, preset: str) -> jobs.Job[Reports]:
-    is_new = weather_result.modifier_of(scene) is None
+    is_new = weather_result.modifier_of(scene.softground.ground) is None
     yield from weather.adding(scene.softground.ground, preset=preset)
     if is_new and not preset:
         weather_result.set_hours(scene, weather_result.NIGHT)

@@ -22,7 +22,7 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
     _result(layout, summary)
     warnings = ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground))
     _warnings(layout, warnings)
-    remedies.draw(layout.column(align=True), options.id_data, warnings, session.current().stale)
+    remedies.draw(layout.column(align=True), options.id_data.softground, warnings, session.current().stale)
     _floating_feet(layout, options, summary)
 
 
@@ -65,34 +65,33 @@ class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
     @classmethod
     def description(cls, context: bpy.types.Context, _properties: Any) -> str:
         """The warnings themselves."""
-        return "\n".join(warnings_of(settings.scene_of(context)))
+        return "\n".join(warnings_of(settings.scene_of(context).softground.ground))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for warning in warnings_of(settings.scene_of(context)):
+        for warning in warnings_of(settings.scene_of(context).softground.ground):
             self.report({"WARNING"}, warning)
         return {"FINISHED"}
 
 
 def _draw_warnings(menu: Any, context: bpy.types.Context) -> None:
     """One after the other, in lines that fit on a screen."""
-    for warning in warnings_of(settings.scene_of(context)):
+    for warning in warnings_of(settings.scene_of(context).softground.ground):
         column = menu.layout.column()
         for line in textwrap.wrap(warning, _WARNING_WIDTH):
             column.label(text=line, translate=False)
-        remedies.draw(column, settings.scene_of(context), [warning])
+        remedies.draw(column, settings.scene_of(context).softground, [warning])
 
 
 _WARNING_WIDTH = 90
 """Letters in a line of a warning."""
 
 
-def warnings_of(scene: bpy.types.Scene) -> list[str]:
+def warnings_of(ground: bpy.types.Object | None) -> list[str]:
     """Findings on the bake on the scene's ground."""
-    ground = scene.softground.ground
     return ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if ground else []
 
 

@@ -202,7 +202,7 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             props = [obj for obj in context.selected_objects if all(obj != item.armature for item in characters)]
             wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene.softground)
-            added = contact_editing.add_object_contacts(scene, character, props)
+            added = contact_editing.add_object_contacts(scene.softground, character, props)
         name = character_setup.title_of(character)
         self.report({"INFO"}, translated("'{name}' also prints with {parts}", name=name, parts=", ".join(added)))
         return {"FINISHED"}

@@ -111,7 +111,7 @@ def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction
 
 
 def shown_cm(scene: bpy.types.Scene) -> float:
-    """The depth that the scene was told last [cm]; 0 before."""
+    """The depth that was shown last for a scene [cm]; 0 before."""
     return (state.told.get(scene.session_uid) or 0.0) * 100
 
 

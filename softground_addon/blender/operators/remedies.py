@@ -6,8 +6,6 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-import bpy
-
 from ..characters.character_setup import title_of
 from ..translation import translated
 
@@ -26,10 +24,9 @@ _FIELDS = {"cell size": "cell_size", "set Detail": "detail", "switch Sink Feet o
 """Settings of the scene, by the words for them."""
 
 
-def draw(layout: Any, scene: bpy.types.Scene, warnings: Sequence[str], changed: str = "") -> None:
+def draw(layout: Any, options: Any, warnings: Sequence[str], changed: str = "") -> None:
     """Show each remedy once, but for those of characters that are named among what has `changed` since the bake."""
     layout.operator_context = "INVOKE_DEFAULT"  # which is another one in a popup
-    options = scene.softground
     for character in options.characters:
         name = f"'{title_of(character)}'"
         text = "" if name in changed else "\n".join(warning for warning in warnings if name in warning)

@@ -94,7 +94,7 @@ def _add(
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", translated("Added '{name}' with {soles}", name=character.name, soles=soles)))
-        elif is_animated(character.armature) and meshes_on(scene, character.armature):
+        elif is_animated(character.armature) and meshes_on(scene.objects, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
         else:

@@ -32,10 +32,10 @@ DEFAULT_LIGHT, LOW_SUN = "Default", "outdoor.sl"
 """Studio lights of Blender: the one it starts with, and one whose sun is low."""
 
 
-def last_step(scene: bpy.types.Scene) -> int:
+def last_step(options: Any) -> int:
     """The frame from which on all prints of the bake on the scene's ground are there."""
-    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(scene.softground.ground))
-    return ceil(summary.get(bake_report.LAST_FRAME) or scene.softground.frame_end)
+    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground))
+    return ceil(summary.get(bake_report.LAST_FRAME) or options.frame_end)
 
 
 def is_first_bake(scene: bpy.types.Scene) -> bool:
@@ -57,11 +57,11 @@ def is_free(area: Any) -> bool:
     return bool(space and space.region_3d.view_perspective == "PERSP" and not space.local_view)
 
 
-def centre(scene: bpy.types.Scene, area: Any, step: BakedStep) -> None:
+def centre(unit_scale: float, area: Any, step: BakedStep) -> None:
     """Move the middle of the view in an area to a step; the view through a camera stays."""
     space = _viewport(area)
     if space and space.region_3d.view_perspective != "CAMERA":
-        space.region_3d.view_location = Vector(_middle(step).tolist()) / scene.unit_settings.scale_length
+        space.region_3d.view_location = Vector(_middle(step).tolist()) / unit_scale
 
 
 def _viewport(area: Any) -> Any:
@@ -74,7 +74,9 @@ def _viewport(area: Any) -> Any:
 
 def _last_prints(scene: bpy.types.Scene) -> list[BakedStep]:
     """The last step that is in the ground at the scene's frame, and those next to it."""
-    visible = [step for step in baked_steps.of(scene) if step.left and step.there_from <= scene.frame_current]
+    visible = [
+        step for step in baked_steps.of(scene.softground.ground) if step.left and step.there_from <= scene.frame_current
+    ]
     if not visible:
         return []
     last = max(visible, key=lambda step: step.there_from)
@@ -144,7 +146,7 @@ class SOFTGROUND_OT_show_prints(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        scene.frame_set(last_step(scene))
+        scene.frame_set(last_step(scene.softground))
         if space := _viewport(context.area):
             _show(scene, context.area, space)
         return {"FINISHED"}

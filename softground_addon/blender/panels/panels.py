@@ -76,7 +76,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
-            _scale(layout, settings.scene_of(context), character)
+            _scale(layout, settings.scene_of(context).unit_settings.scale_length, character)
             _on_the_spot(layout, settings.scene_of(context), character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
@@ -85,9 +85,9 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
 
 
-def _scale(layout: Any, scene: Any, character: Any) -> None:
+def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     """What size a character has whose file is in other units, and a button that puts it right."""
-    size = stature_of(scene, character.armature) if character.armature else 0.0
+    size = stature_of(unit_scale, character.armature) if character.armature else 0.0
     captured = is_captured(character)
     factor = scale_to_metres(size, captured=captured)
     if factor == 1.0:

@@ -6,7 +6,7 @@ as known until what it was read from changes; what the add-on itself writes leav
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -148,7 +148,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
         shot = yield from read_shot(scene, replace(wanted, response=None))
         source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
-        _tell_of_changes(scene)  # response layers were switched off and on again, which is no edit
+        _tell_of_changes(scene.view_layers)  # response layers were switched off and on again, which is no edit
         state.analyses[scene.session_uid] = analysis
     return analysis
 
@@ -157,12 +157,12 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
     if scene.session_uid in state.analyses:
-        _tell_of_changes(scene)  # of what others have changed until now, while it still counts
+        _tell_of_changes(scene.view_layers)  # of what others have changed until now, while it still counts
     analysis = known(scene)
     yield
     if analysis is None:
         return
-    _tell_of_changes(scene)
+    _tell_of_changes(scene.view_layers)
     source = _source(scene, settings.snapshot(scene))
     if source in analysis.sources:
         state.analyses[scene.session_uid] = analysis
@@ -171,9 +171,9 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
         state.analyses[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
-def _tell_of_changes(scene: bpy.types.Scene) -> None:
+def _tell_of_changes(view_layers: Iterable[bpy.types.ViewLayer]) -> None:
     """Have Blender call the handlers for what was changed by now."""
-    for layer in scene.view_layers:
+    for layer in view_layers:
         layer.update()
 
 
@@ -242,7 +242,7 @@ def _keep(
 def _hash_of(scene: bpy.types.Scene) -> str:
     """What a shot is read from, as far as it is not seen in the settings."""
     wanted = settings.snapshot(scene)
-    return report.hash_inputs(staleness.of_movers(scene, wanted), staleness.of_ground(wanted))
+    return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
 
 
 def _source(scene: bpy.types.Scene, wanted: BakeSettings) -> _Source:

@@ -79,7 +79,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
     ground = settings.found(wanted.ground) if wanted.ground else None
-    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene, wanted))
+    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
     known |= {ground, display_mesh_of(ground)} if ground else set()
     found = []
     for obj in scene.objects:

@@ -105,7 +105,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     InputError
         If not; names what is wrong and the remedy.
     """
-    settings.forget_deleted_ground(scene)
+    settings.forget_deleted_ground(scene.softground)
     setting_paths.check_stored(scene.softground)
     for character in scene.softground.characters:
         rig = character.armature or character.body
@@ -127,7 +127,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     for printing in wanted.characters:
         if printing.armature:
             require_armature(settings.found(printing.armature))
-        check_props(scene, printing.name, printing.soles, ground)
+        check_props(scene.objects, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
@@ -235,10 +235,10 @@ def sample_characters(
         if character.armature:
             armature = settings.found(character.armature)
             if wanted.response:
-                check_rig(scene, armature, mapping, character.mass_kg)
-                controls = controls_of(scene, armature, mapping)
+                check_rig(scene.objects, armature, mapping, character.mass_kg)
+                controls = controls_of(scene.view_layers[0], armature, mapping)
                 poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
-            grown = size_of(scene, armature) / character.size_m if character.size_m else 1.0
+            grown = size_of(scene.unit_settings.scale_length, armature) / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,
                 armature,

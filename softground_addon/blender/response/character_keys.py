@@ -78,7 +78,7 @@ def response_curves(
     return curves
 
 
-def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
+def controls_of(view_layer: bpy.types.ViewLayer, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
     """The bones of a rig that a response is keyed on.
 
     Raises
@@ -87,7 +87,7 @@ def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Rig
         If it has no bone that carries the body, or bones of the mapping are gone.
     """
     check_bones(armature, mapping)
-    depsgraph = scene.view_layers[0].depsgraph
+    depsgraph = view_layer.depsgraph
     assert depsgraph is not None
     return find_controls(armature, armature.evaluated_get(depsgraph), mapping)
 

@@ -117,7 +117,7 @@ def draw_numbers() -> None:
 
 def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
     """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
-    shown = live.in_contact(scene)
+    shown = live.in_contact(scene.session_uid)
     if shown is not None:
         windows, size, reach = shown
         touched = [overlay_shapes.marked(window, mask) for window, mask in windows]

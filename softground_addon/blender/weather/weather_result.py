@@ -22,22 +22,21 @@ MOST_SNOW, ROUNDS = 100.0, 40
 """Most snowfall [cm/h], and how often the range in which it is sought is halved."""
 
 
-def modifier_of(scene: bpy.types.Scene) -> Any:
+def modifier_of(ground: bpy.types.Object | None) -> Any:
     """The weather on a scene's ground; None where there is none."""
-    ground = scene.softground.ground
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
     return modifier if modifier and modifier.node_group and within(modifier.node_group) else None
 
 
 def hours(scene: bpy.types.Scene) -> float:
     """How long the scene lasts in the time of its weather, whose scale is not keyed [h]."""
-    modifier = modifier_of(scene)
+    modifier = modifier_of(scene.softground.ground)
     return weather_keys.values_of(modifier)["Time Scale"] * _seconds(scene, modifier) / HOUR if modifier else 0.0
 
 
 def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
     """Have the scene last so long [h]; as much snow lies at its end as before."""
-    if modifier := modifier_of(scene):
+    if modifier := modifier_of(scene.softground.ground):
         depth = snow_cm(scene)
         _write(modifier, "Time Scale", wanted * HOUR / _seconds(scene, modifier))
         set_snow_cm(scene, depth)
@@ -45,13 +44,13 @@ def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
 
 def snow_cm(scene: bpy.types.Scene) -> float:
     """Depth of the new snow on open ground at the end of the scene [cm]."""
-    modifier = modifier_of(scene)
+    modifier = modifier_of(scene.softground.ground)
     return _cover_cm(scene, modifier)() if modifier else 0.0
 
 
 def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
     """Let so much snow fall that it lies that deep at the end [cm], or the most that can fall."""
-    if modifier := modifier_of(scene):
+    if modifier := modifier_of(scene.softground.ground):
         cover = _cover_cm(scene, modifier)
         least, most = 0.0, MOST_SNOW if wanted > 0 else 0.0
         for _ in range(ROUNDS if most else 0):

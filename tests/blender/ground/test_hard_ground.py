@@ -114,13 +114,13 @@ def test_the_warning_has_a_button_that_adds_the_crate_and_the_bake_notices_when_
     warnings, drawn = bake(scene).report["warnings"], []
     layout = MagicMock()
     layout.operator.side_effect = lambda name, **how: drawn.append((name, button := SimpleNamespace(**how))) or button
-    remedies.draw(layout, scene, warnings)
+    remedies.draw(layout, scene.softground, warnings)
     ((name, button),) = drawn
     assert (name, button.text, button.object) == ("softground.add_hard_ground", "Add 'Crate'", "Crate")
     bpy.ops.softground.add_hard_ground(object=button.object)
     assert settings.hard_grounds_of(scene.softground) == [crate]
     drawn.clear()
-    remedies.draw(layout, scene, warnings)
+    remedies.draw(layout, scene.softground, warnings)
     assert not drawn
     assert bake_report.stale_reasons(scene) == ("The settings have changed",)
     bake(scene)

@@ -552,7 +552,7 @@ def test_a_depth_that_all_steps_share_is_told_once(typical, deepest, shown):
 def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     def buttons():
         layout = MagicMock()
-        bake_result._warnings(layout, bake_result.warnings_of(shot))
+        bake_result._warnings(layout, bake_result.warnings_of(shot.softground.ground))
         return [call.kwargs["text"] for call in layout.mock_calls]
 
     assert buttons() == []

@@ -130,13 +130,13 @@ def test_usd_holds_the_moving_ground_and_its_shading(scene, ground, tmp_path):
     assert "softground_compression" in copy.data.attributes
 
 
-def write_and_read(kind, scene, ground, folder, start, end):
+def write_and_read(kind, ground, folder, start, end):
     """An object of what was written."""
     export, importer, options = {
         "abc": (exports.export_alembic, bpy.ops.wm.alembic_import, {"as_background_job": False}),
         "usdc": (exports.export_usd, bpy.ops.wm.usd_import, {}),
     }[kind]
-    export(scene, ground, folder / f"ground.{kind}", start, end)
+    export(ground, folder / f"ground.{kind}", start, end)
     return import_and_select(importer, folder / f"ground.{kind}", **options)
 
 
@@ -146,7 +146,7 @@ def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, g
     display_mesh = baked_ground.display_mesh_of(ground)
     finer = display_mesh.modifiers.new("Finer", "SUBSURF")
     finer.levels = finer.render_levels = 1
-    copy = write_and_read(kind, scene, ground, tmp_path, 37, 40)
+    copy = write_and_read(kind, ground, tmp_path, 37, 40)
     for frame in (37, 40):
         np.testing.assert_allclose(played(copy, frame), played(display_mesh, frame), atol=1e-5)
 
@@ -161,7 +161,7 @@ def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(sce
     scene.softground.frame_start, scene.softground.frame_end = -49, -20
     bpy.context.view_layer.update()
     jobs.run(bake_job.bake(scene))
-    copy = write_and_read("abc", scene, ground, tmp_path, -49, -20)
+    copy = write_and_read("abc", ground, tmp_path, -49, -20)
     for frame in (-40, -20):
         assert_stands_as_recorded(ground, frame, played(copy, frame))
     with pytest.raises(InputError, match=r"from frame 0 on, not from -49"):
@@ -178,7 +178,7 @@ def test_the_export_is_the_only_file_whatever_the_world_looks_like(scene, ground
     if kind == "obj":
         exports.export_final(ground, path)
     else:
-        {"abc": exports.export_alembic, "usdc": exports.export_usd}[kind](scene, ground, path, *FRAMES)
+        {"abc": exports.export_alembic, "usdc": exports.export_usd}[kind](ground, path, *FRAMES)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -188,7 +188,7 @@ def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_pa
     bpy.context.view_layer.objects.active = scene.objects["Walker"]
     scene.objects["Walker"].select_set(True)
     frames = (scene.frame_start, scene.frame_end)
-    export(scene, ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
+    export(ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
     assert [thing.name for thing in bpy.context.selected_objects] == ["Walker"]
     assert bpy.context.view_layer.objects.active.name == "Walker"
     assert (scene.frame_start, scene.frame_end, scene.frame_current_final) == (*frames, 7.25)
@@ -203,7 +203,7 @@ def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, k
     display_mesh = baked_ground.display_mesh_of(ground)
     display_mesh.hide_set(True)
     display_mesh.hide_viewport = display_mesh.hide_render = True
-    export(scene, ground, tmp_path / f"ground.{kind}", 10, 12)
+    export(ground, tmp_path / f"ground.{kind}", 10, 12)
     assert (display_mesh.hide_get(), display_mesh.hide_viewport, display_mesh.hide_render) == (True, True, True)
     copy = import_and_select(read, tmp_path / f"ground.{kind}")
     assert len(copy.data.vertices) == len(display_mesh.data.vertices)

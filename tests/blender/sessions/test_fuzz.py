@@ -384,7 +384,7 @@ def felt(addon, tmp_path_factory):
     assert bpy.ops.softground.bake() == {"FINISHED"}
     bake = step_edits.editable(scene)
     shoe = {step_id(bake.left.footprints[0]): StepEdit(sole="Shoe")}
-    step_edits.edit(scene, bake, step_soles.edits_with_soles(scene, bake.made_with, shoe))
+    step_edits.edit(scene, bake, step_soles.edits_with_soles(scene.objects, bake.made_with, shoe))
     path = tmp_path_factory.mktemp("felt") / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
