@@ -116,17 +116,13 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
     options.slowed_time = (render.frame_map_old, render.frame_map_new)
 
 
-def gravity_of(scene: bpy.types.Scene) -> float:
-    """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
-    return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
-
-
 def units_of(scene: bpy.types.Scene) -> SceneUnits:
-    """Frames and lengths of a scene, as they are now."""
+    """Frames, lengths and gravity of a scene, as they are now; the Earth's gravity where it is switched off."""
+    pull = float(scene.gravity.length) if scene.use_gravity else 0.0
     return SceneUnits(
         frame_rate=frame_rate_of(scene),
         time_stretch=time_stretch_of(scene),
-        gravity_m_s2=typed(gravity_of(scene)),
+        gravity_m_s2=typed(pull if pull > 0 else STANDARD_GRAVITY),
         unit_scale_m=typed(scene.unit_settings.scale_length),
     )
 

@@ -86,7 +86,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         velocity = yield from meanwhile(Progress("simulate", 1.0), work)
         if velocity is None:
             continue
-        travel, curves = _layer(scene, moving, motion, wanted, velocity)
+        travel, curves = _layer(scene.view_layers[0], moving, motion, wanted, velocity)
         layers.append((moving.armature, travel, curves))
     if not layers:
         raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
@@ -109,7 +109,7 @@ def speed_of(armature: bpy.types.Object) -> float:
 
 
 def _layer(
-    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
     character: CharacterSettings,
     motion: CharacterMotion,
     wanted: BakeSettings,
@@ -118,7 +118,7 @@ def _layer(
     """The keys of one character: on the bone that moves its whole rig, else on the armature object."""
     assert character.armature
     armature = settings.found(character.armature)
-    bone = _bone(scene, armature, RigMapping(character.joints, character.soles, "settings"))
+    bone = _bone(view_layer, armature, RigMapping(character.joints, character.soles, "settings"))
     path = path_of_bone(bone, "location") if bone else "location"
     duration = (motion.frames[-1] - motion.frames[0]) / motion.frame_rate
     way = np.append(duration * velocity, 0.0) / wanted.unit_scale_m
@@ -128,10 +128,10 @@ def _layer(
     return Travel(armature.name, bone or armature.name, float(np.linalg.norm(velocity))), curves
 
 
-def _bone(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> str:
+def _bone(view_layer: bpy.types.ViewLayer, armature: bpy.types.Object, mapping: RigMapping) -> str:
     """The bone to key; empty for the object, as where that turns in the animation."""
     if armature.parent or any(not path.startswith("pose.bones") for path, _ in animated_paths(armature)):
         return ""
-    depsgraph = scene.view_layers[0].depsgraph
+    depsgraph = view_layer.depsgraph
     assert depsgraph is not None
     return travelling_bone(armature, armature.evaluated_get(depsgraph), mapping)

@@ -26,11 +26,10 @@ def object_of(objects: settings.Objects, name: str) -> bpy.types.Object | None:
     return next((obj for obj in objects if obj.name_full == name), None)
 
 
-def names(scene: bpy.types.Scene) -> list[str]:
+def names(objects: settings.Objects, ground: bpy.types.Object | None) -> list[str]:
     """Objects that steps may take their sole from: the meshes but the ground and what shows its prints."""
-    ground = scene.softground.ground
     grounds = {ground, baked_ground.display_mesh_of(ground)} if ground else set()
-    return [obj.name_full for obj in scene.objects if obj.type == "MESH" and obj not in grounds]
+    return [obj.name_full for obj in objects if obj.type == "MESH" and obj not in grounds]
 
 
 def edits_with_soles(

@@ -63,7 +63,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
-    _fill(scene, character, mapping)
+    _fill(scene.unit_settings.scale_length, character, mapping)
     if mapping.mass:
         character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
@@ -97,7 +97,7 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     length = yield from _shortest_sole(scene, found(name), recognised)
     character = settings.characters.add()
     character.name, character.body = name.name, found(name)
-    _fill(scene, character, recognised.mapping)
+    _fill(scene.unit_settings.scale_length, character, recognised.mapping)
     character.mass = recognised.mapping.mass or character.mass
     settings.active_character = len(settings.characters) - 1
     stretch = time_stretch_of(scene)
@@ -217,13 +217,13 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     mapping = (yield from recognise(scene, armature, animated_frames(scene, armature))).mapping
     if not mapping.soles:
         raise InputError(f"No feet found in '{armature.name}': {CHOOSE_CONTACTS}.")
-    _fill(scene, scene.softground.characters[number], mapping)
+    _fill(scene.unit_settings.scale_length, scene.softground.characters[number], mapping)
     return [source.name for source in mapping.soles]
 
 
-def _fill(scene: bpy.types.Scene, character: SoftGroundCharacter, mapping: RigMapping) -> None:
+def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping) -> None:
     character.skin_mass = mapping.mass
-    character.size = size_of(scene.unit_settings.scale_length, character.armature) if character.armature else 0.0
+    character.size = size_of(unit_scale, character.armature) if character.armature else 0.0
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:

@@ -146,18 +146,15 @@ class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
     bl_label = "Walk Ahead"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        return _walking_ahead(scene, self.chosen(scene.softground))
-
-
-def _walking_ahead(scene: bpy.types.Scene, character: Any) -> jobs.Job[Reports]:
-    name, mover = character_setup.title_of(character), character.armature or character.body
-    rig = mover and settings.name_of(mover)
-    known = yield from analysis.reading(scene)
-    belt = known.belts.get(name)
-    if belt is None or rig is None:
-        raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
-    walk_ahead(scene, settings.found(rig), -belt)
-    return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
+        character = self.chosen(scene.softground)
+        name, mover = character_setup.title_of(character), character.armature or character.body
+        rig = mover and settings.name_of(mover)
+        known = yield from analysis.reading(scene)
+        belt = known.belts.get(name)
+        if belt is None or rig is None:
+            raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
+        walk_ahead(scene, settings.found(rig), -belt)
+        return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
 class SOFTGROUND_OT_detect_bones(_ReadingCharacter):

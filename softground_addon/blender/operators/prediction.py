@@ -72,9 +72,8 @@ def asked(scene: bpy.types.Scene) -> BakeSettings:
     return _look(scene)[0]
 
 
-def fineness(scene: bpy.types.Scene, predicted: DepthPrediction) -> Fineness:
+def fineness(wanted: BakeSettings, predicted: DepthPrediction) -> Fineness:
     """Fineness of the bake to come, with what legs will carve at the depth to expect."""
-    wanted = asked(scene)
     length = shortest_sole([character.motion for character in predicted.analysis.loads])
     return replace(wanted.fineness, is_carved=wanted.carves and bool(wading(predicted.depth or 0.0, length) > 0))
 
@@ -123,7 +122,7 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     if not depth > 0:
         return
     try:
-        known = analysis.read(scene) if bpy.app.background else analysis.current(scene)
+        known = analysis.read(scene) if bpy.app.background else jobs.run(analysis.refreshing(scene))
         if known is None:
             return
         wanted = settings.snapshot(scene)
@@ -151,16 +150,11 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
 
 
-def _aim_of(scene: bpy.types.Scene) -> _Aim | None:
-    """The depth that was typed last, taken away; None where the stiffness was set otherwise since."""
-    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
-    return aim if aim and scene.softground.material.youngs_modulus == aim.modulus else None
-
-
 def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
     """Set the stiffness for the depth that was typed last, unless it is set otherwise meanwhile."""
-    aim, known = _aim_of(scene), analysis.known(scene)
-    if aim is None or known is None:
+    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
+    known, material = analysis.known(scene), scene.softground.material
+    if aim is None or known is None or material.youngs_modulus != aim.modulus:
         return
     wanted = settings.snapshot(scene)
     search = matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)

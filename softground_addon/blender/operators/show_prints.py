@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, pi, radians
 from typing import Any
 
@@ -48,7 +49,7 @@ def show_first(scene: bpy.types.Scene, area: Any) -> None:
     """Show the prints of a first bake in an area, if its view is free."""
     state.seen_prints.add(scene.session_uid)
     if is_free(area):
-        _show(scene, area, area.spaces.active)
+        _show(_last_prints(scene.softground.ground, scene.frame_current), area, scene.unit_settings.scale_length)
 
 
 def is_free(area: Any) -> bool:
@@ -72,11 +73,9 @@ def _viewport(area: Any) -> Any:
     return None if space.region_quadviews or space.region_3d.lock_rotation else space
 
 
-def _last_prints(scene: bpy.types.Scene) -> list[BakedStep]:
-    """The last step that is in the ground at the scene's frame, and those next to it."""
-    visible = [
-        step for step in baked_steps.of(scene.softground.ground) if step.left and step.there_from <= scene.frame_current
-    ]
+def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[BakedStep]:
+    """The last step that is in the ground at a frame, and those next to it."""
+    visible = [step for step in baked_steps.of(ground) if step.left and step.there_from <= frame]
     if not visible:
         return []
     last = max(visible, key=lambda step: step.there_from)
@@ -88,9 +87,9 @@ def _middle(step: BakedStep) -> NDArray[np.float64]:
     return step.outline().mean(axis=0)
 
 
-def _show(scene: bpy.types.Scene, area: Any, space: Any) -> None:
-    """Frame the last prints and light them."""
-    prints = _last_prints(scene)
+def _show(prints: Sequence[BakedStep], area: Any, unit_scale: float) -> None:
+    """Frame prints in an area, if there are any, and light them; `unit_scale` is that of their scene [m]."""
+    space = area.spaces.active
     if not prints:
         return
     points = np.concatenate([step.outline() for step in prints])
@@ -98,7 +97,7 @@ def _show(scene: bpy.types.Scene, area: Any, space: Any) -> None:
     width = np.ptp(prints[0].outline()[:, :2], axis=0).min()
     reach = min(float(np.linalg.norm(points - middle, axis=1).max()), LONGEST * float(width))
     look = (prints[0].left or prints[0].baked).heading + ASIDE
-    metre = 1.0 / scene.unit_settings.scale_length
+    metre = 1.0 / unit_scale
     view, distance = space.region_3d, DISTANCE * reach * metre * space.lens / 50.0
     view.view_perspective = "PERSP"
     turn(area, Vector(middle) * metre + Vector((0.0, 0.0, RAISED * distance)), look, distance)
@@ -147,8 +146,9 @@ class SOFTGROUND_OT_show_prints(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         scene.frame_set(last_step(scene.softground))
-        if space := _viewport(context.area):
-            _show(scene, context.area, space)
+        if _viewport(context.area):
+            prints = _last_prints(scene.softground.ground, scene.frame_current)
+            _show(prints, context.area, scene.unit_settings.scale_length)
         return {"FINISHED"}
 
 

@@ -38,7 +38,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         if predicted:
             row = column.row()
             row.active = False
-            text = estimate(predicted.analysis.coverage, prediction.fineness(scene, predicted))
+            text = estimate(predicted.analysis.coverage, prediction.fineness(prediction.asked(scene), predicted))
             row.label(text=text, icon="TIME", translate=False)
         if options.relief == "CLOSE_UP":
             column.prop(options, "relief_vertices")

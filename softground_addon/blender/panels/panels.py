@@ -77,7 +77,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             _scale(layout, settings.scene_of(context).unit_settings.scale_length, character)
-            _on_the_spot(layout, settings.scene_of(context), character)
+            _on_the_spot(layout, prediction.of(settings.scene_of(context)), character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
                 by_volume = mass == character.skin_mass
@@ -103,9 +103,8 @@ def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     box.operator("softground.fix_scale", text=translated("Scale by {factor}", factor=f"{factor:g}"), translate=False)
 
 
-def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
+def _on_the_spot(layout: Any, predicted: prediction.DepthPrediction | None, character: Any) -> None:
     """That a character walks in place, and a button that lets it travel."""
-    predicted = prediction.of(scene)
     title = title_of(character)
     if is_prop(character) or predicted is None or title not in predicted.analysis.belts:
         return

@@ -105,19 +105,21 @@ def is_empty() -> bool:
 def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models that it was last asked for.
 
-    Only looks; see `current`.
+    Only looks; see `refreshing`.
     """
     analysis: Analysis | None = state.analyses.get(scene.session_uid)
-    return analysis if analysis and _source(scene, wanted or settings.snapshot(scene)) in analysis.sources else None
-
-
-def current(scene: bpy.types.Scene) -> Analysis | None:
-    """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
-    return jobs.run(refreshing(scene))
+    return (
+        analysis
+        if analysis and _source(scene.softground.ground, wanted or settings.snapshot(scene)) in analysis.sources
+        else None
+    )
 
 
 def refreshing(scene: bpy.types.Scene) -> jobs.Job[Analysis | None]:
-    """What `current` does, in steps. The scene is asked for nothing after the first."""
+    """The scene's analysis if it was read and still holds, with the masses and force models of the moment, in steps.
+
+    The scene is asked for nothing after the first.
+    """
     wanted, uid = settings.snapshot(scene), scene.session_uid
     analysis = known(scene, wanted)
     if analysis is None or analysis.terms == _terms(wanted):
@@ -146,7 +148,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     if analysis is None:
         wanted = settings_of(scene)
         shot = yield from read_shot(scene, replace(wanted, response=None))
-        source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
+        source, hashes = _source(scene.softground.ground, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
         _tell_of_changes(scene.view_layers)  # response layers were switched off and on again, which is no edit
         state.analyses[scene.session_uid] = analysis
@@ -163,7 +165,7 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     if analysis is None:
         return
     _tell_of_changes(scene.view_layers)
-    source = _source(scene, settings.snapshot(scene))
+    source = _source(scene.softground.ground, settings.snapshot(scene))
     if source in analysis.sources:
         state.analyses[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
@@ -226,14 +228,14 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
 
 
 def _keep(
-    scene: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
+    uid: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
 ) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on, by the session uid of its scene."""
     loads = yield from estimate_shot(wanted, shot)
     pressing = pressed_contacts.slices(loads, ground_of(wanted, shot), wanted.cell_size_m)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), pressing)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, coverage_of(loads))
-    state.analyses[scene] = analysis
+    state.analyses[uid] = analysis
     state.depths.clear()
     state.depths[_key(wanted, analysis)] = contacts.typical
     return analysis
@@ -245,9 +247,9 @@ def _hash_of(scene: bpy.types.Scene) -> str:
     return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
 
 
-def _source(scene: bpy.types.Scene, wanted: BakeSettings) -> _Source:
+def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
     """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
-    return _parts(wanted)[0], wanted.ground and _place(scene.softground.ground)
+    return _parts(wanted)[0], ground and wanted.ground and _place(ground)
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:

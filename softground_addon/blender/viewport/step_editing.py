@@ -183,7 +183,10 @@ def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
     """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
     scene = settings.scene_of(context)
     steps = baked_steps.of(scene.softground.ground)
-    meshes = {*step_soles.names(scene), *mesh_soles({step.name: step.edit for step in steps})}
+    meshes = {
+        *step_soles.names(scene.objects, scene.softground.ground),
+        *mesh_soles({step.name: step.edit for step in steps}),
+    }
     names = [*sorted(steps[0].feet if steps else ()), *sorted(meshes)]
     return [name for name in names if text.lower() in name.lower()]
 

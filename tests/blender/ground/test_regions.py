@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_slots, settings
+from softground_addon.blender import ground_slots, jobs, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
@@ -142,7 +142,7 @@ def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     editable = step_edits.editable(four)
     number, step = next((n, s) for n, s in enumerate(editable.left.steps) if where(s.baked) == 0)
     edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
-    step_edits.edit(four, editable, {step.name: edit})
+    jobs.run(step_edits.editing(four, editable, {step.name: edit}))
     left = baked_ground.record_of(four.softground.ground).steps[number].left
     assert left.surface == "mud"
     assert left.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)

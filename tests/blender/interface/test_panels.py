@@ -265,7 +265,7 @@ def test_a_bake_is_expected_to_carve_where_feet_sink_beyond_the_ankle(shot):
     for modulus, carves in ((123e3, True), (3e6, False)):
         material.youngs_modulus = modulus
         bpy.ops.softground.predict_depth()
-        assert prediction.fineness(shot, prediction.of(shot)).is_carved == carves
+        assert prediction.fineness(prediction.asked(shot), prediction.of(shot)).is_carved == carves
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat
+from softground_addon.blender import compat, jobs
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
@@ -92,8 +92,8 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     assert np.mean(np.abs(lies[away, 2] - level) < 1e-3) > 0.95  # some lie at the tips of prints
     pieces = positions(obj.data)
     bake = step_edits.editable(opened)  # an edit throws in the same weather
-    step_edits.edit(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)})
-    step_edits.edit(opened, bake, {})
+    jobs.run(step_edits.editing(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(opened, bake, {}))
     assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from softground_addon.blender import session
+from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_report, step_edits, step_soles
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.ground import baked_ground, ground_mesh
@@ -222,7 +222,7 @@ def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     shown = heights(ground, DISPLAY_KEY)
     preview.end()
     assert fingerprints.of_file() == before
-    step_edits.edit(baked, step_edits.editable(baked), edits)
+    jobs.run(step_edits.editing(baked, step_edits.editable(baked), edits))
     np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
 
 
