@@ -98,7 +98,6 @@ def regions_of(ground: bpy.types.Object, length_scale: float = 1.0) -> tuple[Reg
 
     Parameters
     ----------
-    ground : bpy.types.Object
     length_scale : float
         Of the rims, for small soles.
     """

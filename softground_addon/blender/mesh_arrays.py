@@ -55,7 +55,6 @@ def add_faces(
 
     Parameters
     ----------
-    mesh : bpy.types.Mesh
     corner_vertex : (L,) int array
         Vertex of each corner.
     face_start : (P,) int array

@@ -25,7 +25,6 @@ def build(tree: Any, fill: Callable[[NodeGraph], None]) -> None:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     fill : callable
         Makes the nodes of a graph, and finishes it.
     """
@@ -41,7 +40,6 @@ class NodeGraph:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     known : bool
         Whether it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
     """

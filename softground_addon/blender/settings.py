@@ -101,7 +101,6 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     speed : float
         Of that which the scene has without this, however often it is asked for.
     """
@@ -138,7 +137,6 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     grounded : bool
         As if Grounding were on.
     """

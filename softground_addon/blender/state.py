@@ -20,7 +20,6 @@ class State:
         and all, which takes longer than many a step of a bake; this does not.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
-    live : LiveMode or None
     jobs : list of ModalJob
         Those that run in a window.
     hooks : dict

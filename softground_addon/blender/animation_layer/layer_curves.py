@@ -23,7 +23,6 @@ class LayerCurve:
     ----------
     path : str
         Data path from the object.
-    index : int
     group : str
         Name under which the user sees the channel: the bone.
     frames, values : (K,) float arrays

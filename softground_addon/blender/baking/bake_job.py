@@ -60,7 +60,6 @@ class BakeResult:
     ----------
     report : dict
         For JSON (see `core.files.report`).
-    footprints : tuple of Footprint
     """
 
     report: dict[str, object]
@@ -80,7 +79,6 @@ def bake(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     write : bool
         False computes and reports only, and changes nothing.
     wanted : BakeSettings, optional
@@ -192,8 +190,6 @@ def write_prints(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    wanted : BakeSettings
     shot : Shot
         Of its ground; the motions are not needed.
     left : BakeRecord

@@ -47,7 +47,6 @@ class CleanFeet:
     ----------
     feet : dict
         "before" and "after": by character "slide", "float" and "penetration", each "p95" and "max" [mm].
-    warnings : tuple of str
     """
 
     feet: Faults

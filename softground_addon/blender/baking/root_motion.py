@@ -36,7 +36,6 @@ class Travel:
 
     Attributes
     ----------
-    character : str
     control : str
         The bone that is keyed, or the armature object.
     speed : float

@@ -41,12 +41,10 @@ class EditableBake:
 
     Attributes
     ----------
-    left : BakeRecord
     made_with : BakeSettings
         The scene's settings, but for what the prints were pressed with.
     shot : Shot
         The undisturbed ground; nobody is on it.
-    steps : EditedSteps
     """
 
     left: record.BakeRecord

@@ -59,7 +59,6 @@ def read(obj: bpy.types.Object, ground: bpy.types.Object | None, unit_scale: flo
 
     Parameters
     ----------
-    obj : bpy.types.Object
     ground : bpy.types.Object or None
         That it is to press.
     unit_scale : float

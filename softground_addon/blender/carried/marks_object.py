@@ -27,15 +27,7 @@ ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 
 
 def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: SceneUnits) -> bpy.types.Object | None:
-    """Let a ground have marks in place of those that it may have; None takes them away.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    marks : Marks or None
-    surface : str
-    units : SceneUnits
-    """
+    """Let a ground have marks in place of those that it may have; None takes them away."""
     older = BELONGS.kept(ground, wanted=marks is not None and bool(len(marks.faces)))
     _remove_unused()
     if marks is None or not len(marks.faces):

@@ -61,8 +61,6 @@ def recognise(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    armature : bpy.types.Object
     frames : tuple of int, optional
         First and last frame of its animation.
 

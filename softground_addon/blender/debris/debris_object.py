@@ -65,10 +65,6 @@ def put(
 
     Parameters
     ----------
-    ground : bpy.types.Object
-    debris : Debris or None
-    surface : str
-    units : SceneUnits
     of_steps : mapping of int to str
         Surfaces of steps, by their numbers, on a ground with regions.
     """

@@ -84,7 +84,6 @@ def write(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     index : (K,) int array
         Vertices of its mesh that the bake moves.
     pressed : GroundSample

@@ -63,7 +63,6 @@ def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Arr
         Whose vertex groups they are.
     mesh : bpy.types.Mesh
         Its own mesh, or the evaluated one.
-    names : Names
 
     Returns
     -------

@@ -78,7 +78,6 @@ class Carried:
     positions : (V, 3) float32 array
     edges, loose_edges : (E, 2) int array
         Vertices of its edges if attributes are on them, and of those without a face, which no face would bring back.
-    layers : tuple of _Layer
     uv_maps : tuple of (str, bool, bool)
         Name of each, and whether it is active, and rendered.
     colours : dict of str to str
@@ -133,7 +132,6 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
 
     Parameters
     ----------
-    name : ObjectName
     carried : Carried
         Of the source.
     surface : Surface

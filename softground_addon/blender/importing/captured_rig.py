@@ -20,9 +20,6 @@ def new_rig(context: bpy.types.Context, name: str, skeleton: Skeleton, frames: A
 
     Parameters
     ----------
-    context : bpy.types.Context
-    name : str
-    skeleton : Skeleton
     frames : (F,) float array
         Scene frame of each pose.
     unit : float
@@ -64,9 +61,6 @@ def new_plate(context: bpy.types.Context, name: str, plate: Plate, frames: Array
 
     Parameters
     ----------
-    context : bpy.types.Context
-    name : str
-    plate : Plate
     frames : (S,) float array
         Scene frame of each sample.
     unit : float

@@ -46,14 +46,12 @@ class LiveMode:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     wanted : BakeSettings
         With its ground.
     known : analysis.Analysis
         Of its shot.
     ground : LiveGround
         Shows `playhead`.
-    playhead : Playhead
     """
 
     def __init__(
@@ -118,7 +116,6 @@ class LiveMode:
 
         Parameters
         ----------
-        scene : bpy.types.Scene
         seconds : float
             Of the processor [s]: where other programs take their share of it, Blender draws no oftener for that.
 

@@ -21,7 +21,6 @@ def selected(ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
 
     Parameters
     ----------
-    ground : bpy.types.Object
     clouds : bool
         True if the format takes point clouds, which have a `radius`. Else they are the vertices of a mesh.
     """

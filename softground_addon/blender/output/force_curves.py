@@ -36,7 +36,6 @@ def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tup
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     frames : (N,) float array
 
     Returns
@@ -101,8 +100,6 @@ def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    footprints : sequence of Footprint
     frames : (N,) float array
         Scene frames; the keys are where those are shown if the scene's time is remapped.
 

@@ -33,7 +33,6 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
 
     Parameters
     ----------
-    obj : bpy.types.Object
     kind : str
         One of `KINDS`.
     table : bpy.types.Object

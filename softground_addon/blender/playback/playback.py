@@ -62,10 +62,8 @@ def attach(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     vertices : (P,) int array
         Vertex of its mesh that each of the spans is of.
-    spans : Spans
     table : bpy.types.Object
         The curves that these lie on, from `keyframe_tables`.
     up : (3,) float array

@@ -162,9 +162,6 @@ class _Vertices:
 
     Parameters
     ----------
-    graph : NodeGraph
-    course : CourseNodes
-    matter : Matter
     up : (3,) floats
         See `build`.
     again, has_water : bool

@@ -59,9 +59,6 @@ class Analysis:
         Of the animation, the meshes and the ground that it was read from, likewise.
     terms : tuple
         Settings that the loads and the contacts depend on beside that.
-    shot : Shot
-    loads : list of CharacterLoads
-    contacts : ShotContacts
     coverage : Coverage
         What the soles cover on the ground.
     """

@@ -39,10 +39,6 @@ def with_hard_objects(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    wanted : BakeSettings
-    motions : sequence of CharacterMotion
-    ground : Terrain
     bounds : (2, 2) float array
         Lower and upper corner of what is looked at [m].
     own : sequence of MeshTerrain

@@ -60,7 +60,6 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
     ----------
     inputs : mapping
         Settings that it was made with, as `BakeSettings.inputs` has them.
-    ground : bpy.types.Object
     hashes : mapping of str to str
         From `of_movers` and `of_soles`, as they were when they were read.
     """
@@ -90,7 +89,6 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     wanted : BakeSettings
         What a bake would be made with now.
     """

@@ -52,11 +52,8 @@ def response_curves(
 
     Parameters
     ----------
-    armature : ObjectName
-    rig : ReadRig
     motion : CharacterMotion
         The source that the response belongs to.
-    response : Response
     metre : float
         Blender unit [m].
     stretch : float

@@ -18,7 +18,6 @@ class RigPoses:
 
     Attributes
     ----------
-    bones : tuple of str
     matrices : dict of str to (F, 4, 4) float array
         Pose of each bone in the armature's frame [Blender units].
     world : (F, 4, 4) float array

@@ -23,10 +23,8 @@ def check_props(
 
     Parameters
     ----------
-    objects : Objects
     owner : str
         Whose soles they are.
-    sources : tuple of SoleSource
     ground : bpy.types.Object, optional
         What they may not be: that which they print on.
     """
@@ -83,7 +81,6 @@ def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tu
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     source : SoleSource
         Names the object.
     matrices : (F, 4, 4) float array

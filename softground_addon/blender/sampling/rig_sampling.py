@@ -122,7 +122,6 @@ def recorded_motion(
     ----------
     recording : Recording
         Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `LONGEST` samples.
-    skin : RigSkin or None
     scene, armature, mapping, mass, skin_mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """

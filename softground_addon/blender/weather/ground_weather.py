@@ -55,7 +55,6 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
 
     Parameters
     ----------
-    ground : bpy.types.Object
     left : BakeRecord, optional
         What its bake left, where that need not be read.
     preset : str, optional

@@ -70,7 +70,6 @@ class Capture:
         Frames per second [Hz].
     first_frame : int
         Number of the first frame.
-    plates : tuple of Plate
     """
 
     labels: tuple[str, ...]

@@ -66,7 +66,6 @@ def captured_body(capture: Capture, up: str | None = None) -> CapturedBody:
 
     Parameters
     ----------
-    capture : Capture
     up : str, optional
         The laboratory's upward axis, one of `UPWARD`; by default the one along which the pelvis is above the feet.
 

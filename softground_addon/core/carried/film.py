@@ -83,7 +83,6 @@ def share_left(pressure: Any, carried: CarriedFilm, slid: float = 0.0) -> Any:
     ----------
     pressure : float or array
         Largest during the contact [Pa].
-    carried : CarriedFilm
     slid : float
         Distance that the sole slides, in sole lengths: from 1 on it leaves twice as much.
     """
@@ -97,8 +96,6 @@ def carry(
 
     Parameters
     ----------
-    meetings : iterable of Meeting
-    carried : CarriedFilm
     areas : (4,) float array
         Of the sole's zones [m²].
     brought : float

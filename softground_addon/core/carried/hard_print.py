@@ -146,12 +146,10 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
 
     Parameters
     ----------
-    grid : SoleGrid
     poses : (T, P, 4, 4) float array
         Of the sole's patches during the contact.
     force : (T,) float array
         Normal force [N].
-    terrain : HardOnSoft
     tolerance : float
         Height above a node up to which a surface is its floor [m].
     """

@@ -51,7 +51,6 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
-    carried : CarriedMass
     surface : str
         What they are of.
     """
@@ -93,10 +92,8 @@ def marks_of(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     steps : sequence of EditableStep
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
-    terrain : Terrain
     surface : str
         What soles take up, of all that the ground is made of.
     shed : mapping of int to float, optional

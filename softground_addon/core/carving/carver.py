@@ -199,7 +199,6 @@ class CarvedCells:
 
         Parameters
         ----------
-        walls : Walls
         body : (rows, columns) bool array
             Cells with a body in the ground.
         corner : tuple of int

@@ -46,11 +46,9 @@ def with_carves(
 
     Parameters
     ----------
-    left : BakeRecord
     responses : iterable of (CharacterMotion, Response)
     skins : mapping of str to WornSkin
         By the names of the characters, of those whose skin was read.
-    ground : SoftGround
     surface : str
         What it is made of.
     """
@@ -82,8 +80,6 @@ def carves_of(
         Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
-    ground : SoftGround
-    walls : Walls
     """
     some = next(iter(footprints.values()))
     steps = {

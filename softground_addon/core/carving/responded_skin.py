@@ -31,9 +31,6 @@ class WornSkin:
     ----------
     character : str
         Its name.
-    skin : RigSkin
-    bones : RigBones
-    mapping : RigMapping
     recording : Recording
         Of all `skin.bones`.
     """
@@ -72,10 +69,8 @@ class RespondedSkin:
 
     Parameters
     ----------
-    worn : WornSkin
     motion : CharacterMotion
         At the frames of its recording.
-    response : Response
 
     Attributes
     ----------

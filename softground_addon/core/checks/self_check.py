@@ -60,7 +60,6 @@ def self_check(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         All that they left.
     terrain : Terrain

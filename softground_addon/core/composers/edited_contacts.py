@@ -32,10 +32,8 @@ def edited_contact(
         What it did.
     other : PressingSole
         That presses it now; the same where the sole is not swapped.
-    edit : StepEdit
     pivot : (3,) float array
         Middle of the print on the undisturbed ground [m].
-    terrain : Terrain
     """
     steps = swapped(steps, sole, other)
     if edit.scale != 1.0:
@@ -53,7 +51,6 @@ def swapped(steps: Steps, sole: PressingSole, other: PressingSole) -> Steps:
     ----------
     steps : Steps
         What `own` did.
-    own, other : PressingSole
     """
     if other is sole:
         return steps
@@ -119,11 +116,8 @@ def _placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length
 
     Parameters
     ----------
-    steps : Steps
-    edit : StepEdit
     pivot : (3,) float array
         Middle of the print on the undisturbed ground [m].
-    terrain : Terrain
     length : float
         Of the sole [m]: the ground's slope is that of a plane as long.
     """

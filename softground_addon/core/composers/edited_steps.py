@@ -59,8 +59,6 @@ def with_edits(
 
     Parameters
     ----------
-    left : BakeRecord
-    edits : mapping of step id to StepEdit
     ground : SoftGround
         That it was baked on.
     cell_size : float

@@ -32,7 +32,6 @@ class _Change:
     ----------
     frame : float
         Scene frame.
-    windows : tuple of Window
     before, after : tuple of (2, rows, columns) float arrays
         State of each window [m], with the windows taken one after the other.
     contact : tuple of (Window, (rows, columns) bool array)
@@ -56,8 +55,6 @@ class Playhead:
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    ground : SoftGround
     cell_size : float
         Side of a cell [m].
     pressed : HeightField, optional
@@ -67,7 +64,6 @@ class Playhead:
 
     Attributes
     ----------
-    undisturbed : UndisturbedCells
     ground : HeightField
         At the frame that is shown; only to be read.
     contact : SparseGrid

@@ -34,7 +34,6 @@ class StepGrid:
 
     Attributes
     ----------
-    timing : Timing
     begin : float
         Scene frame of step 0.
     """

@@ -40,8 +40,6 @@ class CharacterResponse:
     ----------
     motion : CharacterMotion
         The source, at scene frames.
-    response : Response
-    before, after : Gaps
     sinkage : float
         Mean depth of the character's prints [m].
     out_of_reach : tuple of OutOfReach

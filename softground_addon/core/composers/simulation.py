@@ -72,7 +72,6 @@ def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: flo
     ----------
     loads : sequence of CharacterLoads
         Characters that share the ground, on time grids of the same step.
-    ground : SoftGround
     cell_size : float
         Side of a cell [m].
 
@@ -95,7 +94,6 @@ class Simulation:
 
     Parameters
     ----------
-    ground : SoftGround
     state : HeightField
         What was pressed of it so far, empty or from `footprints.recompose`; it is worked on.
     undisturbed : UndisturbedCells, optional
@@ -167,7 +165,6 @@ class ShotContact:
 
     Attributes
     ----------
-    character : CharacterLoads
     of : (int, int)
         Number of the character and of its sole.
     during : slice
@@ -240,7 +237,6 @@ class TimeGrid:
         Steps at whole frames.
     offsets : list of int
         Step at which each character appears.
-    timing : Timing
     """
 
     frames: Array

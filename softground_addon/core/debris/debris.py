@@ -130,10 +130,8 @@ def sources(
 
     Parameters
     ----------
-    thrown : sequence of Throw
     steps : sequence of EditableStep
         With all of their rims.
-    surface : str
     gravity : float
         [m/s²]
     """
@@ -187,7 +185,6 @@ def throw(
     ----------
     found : sequence of Source
         From `sources`.
-    surface : str
     gravity : float
         [m/s²]
     height : callable

@@ -36,10 +36,8 @@ def thrown(
 
     Parameters
     ----------
-    left : BakeRecord
     ground : SoftGround
         Before anything pressed it.
-    surface : str
     cell_size : float
         [m]
     gravity : float

@@ -210,7 +210,6 @@ def fitted_to_free_fall(
 
     Parameters
     ----------
-    points : MassPoints
     accelerations : (M, parts, 3) float array
         Acceleration of each part's centre at steps of free fall [m/s²].
     gravity : float

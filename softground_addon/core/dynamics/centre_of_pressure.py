@@ -55,7 +55,6 @@ def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, ta
 
     Parameters
     ----------
-    motion : CharacterMotion
     lowest : (N, S, 3) float array
         Its `lowest_points` [m].
     share : (N, S) float array

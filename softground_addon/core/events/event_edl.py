@@ -15,7 +15,6 @@ def dump(events: Sequence[Event], *, frame_rate: float) -> str:
 
     Parameters
     ----------
-    events : sequence of Event
     frame_rate : float
         Scene frames per second [Hz]; timecode counts whole ones.
     """

@@ -68,7 +68,6 @@ def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
         Of the table, in its first line.
     time : (N,) float array
         [s]
-    feet : sequence of FootForce
     """
     labels, columns = ["time"], [time[:, None]]
     for foot in feet:

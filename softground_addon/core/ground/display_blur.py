@@ -49,7 +49,6 @@ def blurred_window(field: SparseGrid, window: Window, sigma: float) -> Array:
     ----------
     field : SparseGrid
         Raw values; what lies around the window is blurred into it.
-    window : Window
     sigma : float
         Standard deviation [m].
 
@@ -76,7 +75,6 @@ def blurred(field: Grid, sigma: float) -> Grid:
 
     Parameters
     ----------
-    field : SparseGrid
     sigma : float
         Standard deviation [m].
     """

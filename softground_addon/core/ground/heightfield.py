@@ -91,7 +91,6 @@ class Surface:
 
     Attributes
     ----------
-    window : Window
     cell_size : float
         Side of a cell [m].
     heights : (rows, columns) float array
@@ -145,7 +144,6 @@ class TerrainTiles:
 
     Parameters
     ----------
-    terrain : Terrain
     cell_size : float
         Side of a cell [m].
     """

@@ -30,7 +30,6 @@ class GroundKind:
     ----------
     surface : str
         See `surfaces`.
-    material : GroundMaterial
     """
 
     surface: str

@@ -66,7 +66,6 @@ class VariationTiles:
 
     Parameters
     ----------
-    variation : Variation
     cell_size : float
         Side of a cell [m].
     """

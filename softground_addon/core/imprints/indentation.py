@@ -56,8 +56,6 @@ class Springs:
 
         Parameters
         ----------
-        force : float
-        material : GroundMaterial
         firmness : float
             See `GroundMaterial.firmness`.
         near : float

@@ -61,7 +61,6 @@ def ground_under(
 
     Parameters
     ----------
-    prop : Prop
     pose : (4, 4) float array
     cells : Surface
         Of all cells that the body is over, at least.

@@ -31,7 +31,6 @@ def cell_coverage(
 
     Parameters
     ----------
-    patches : iterable of PatchOverCells
     fine : Window
         Cells that are `divisions` times smaller than those looked for.
     sinkage : (N,) float array
@@ -63,10 +62,8 @@ def patches_over_cells(
 
     Parameters
     ----------
-    sole : Sole
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
-    ground : Surface
     lowest : (N,) float array
         Height of the sole's lowest point above the undisturbed ground [m].
     tolerance : float

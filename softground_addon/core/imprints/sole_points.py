@@ -61,7 +61,6 @@ class SolePoints:
 
     Attributes
     ----------
-    patches : tuple of PatchPoints
     length : float
         Longest extent of the sole's outline [m], the scale of `TOLERANCE` and `FINEST_DETAIL`.
     """
@@ -116,7 +115,6 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
 
     Parameters
     ----------
-    sole : Sole
     transforms : (F, P, 4, 4) float array
         Its motion, to know how its patches lie to each other when the sole is flat.
     """
@@ -166,7 +164,6 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
 
     Parameters
     ----------
-    points : SolePoints
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
     ground : Surface
@@ -253,7 +250,6 @@ def centroid(points: SolePoints, transforms: Array, pressing: Array) -> Array:
 
     Parameters
     ----------
-    points : SolePoints
     transforms : (N, P, 4, 4) float array
     pressing : (N, Q) or (1, Q) float array
         Area in contact of each point [m²].

@@ -34,7 +34,6 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
 
     Parameters
     ----------
-    motion : CharacterMotion
     placements : mapping of int to Placement
         By sole.
     touching : (F, S) bool array
@@ -67,8 +66,6 @@ def hips_go_along(
 
     Parameters
     ----------
-    motion : CharacterMotion
-    soles : sequence of int
     offsets : sequence of (F, D) float arrays
         Movement of the foot on each [m].
     touching : (F, S) bool array

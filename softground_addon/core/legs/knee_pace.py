@@ -67,7 +67,6 @@ class PacedLeg:
 
     Attributes
     ----------
-    source : Leg
     hip, ankle : (F, 3) float arrays
         Where they would go [m].
     reach : (F,) float array
@@ -116,7 +115,6 @@ class _Hips:
         Order of the derivative of their movement that is to be small.
     smoothing : float
         Cost of this derivative, beside `magnitude`, that of the deviation: see `SMOOTHING_TIME`.
-    magnitude : float
     """
 
     axes: Array

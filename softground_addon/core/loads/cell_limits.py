@@ -169,8 +169,6 @@ def check_cell_size(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    fine : Fineness
     longest : float
         What the bake may take [s].
     available : float, optional
@@ -220,8 +218,6 @@ def check_frames(
 
     Parameters
     ----------
-    first, last : int
-    characters : int
     longest : float
         What the bake may take [s].
     available : float, optional

@@ -33,7 +33,6 @@ def clearances(points: Array, terrain: Terrain, *, reach: float) -> tuple[Array,
     ----------
     points : (N, L, 3) float array
         World positions of the landmarks [m].
-    terrain : Terrain
     reach : float
         Half the distance over which the ground's slope is read [m].
 

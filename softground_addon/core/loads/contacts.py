@@ -283,7 +283,6 @@ def slowest_belt(velocities: Sequence[Array], motion: CharacterMotion) -> float:
     ----------
     velocities : sequence of (N, 2 or 3) float array
         Of each sole [m/s].
-    motion : CharacterMotion
     """
     fastest = max(float(np.percentile(np.linalg.norm(velocity[:, :2], axis=1), 95)) for velocity in velocities)
     unit = motion.froude_speed

@@ -143,7 +143,6 @@ def _pushed(
         Of the centre from each frame to the next [m/s].
     seen : Contacts
         At the frames.
-    motion : CharacterMotion
     steps, shortest, lasting : int
         Steps in a frame, of the shortest contact, and over which a change of velocity acts.
     landing_only : bool

@@ -32,7 +32,6 @@ def joined(
     parts : sequence of (samples, contacts, forces)
         Those that were looked at. Nothing bears in others, nor from the last sample before a jump to the first after
         it, but for soles that stay.
-    steps : int
     """
     count, soles = (len(motion.frames) - 1) * steps + 1, len(motion.soles)
     contacts = Contacts(

@@ -28,7 +28,6 @@ class MissedStep:
 
     Attributes
     ----------
-    sole : str
     frame : float
         Scene frame at which it comes to rest.
     clearance : float
@@ -46,7 +45,6 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
 
     Parameters
     ----------
-    motion : CharacterMotion
     contacts : Contacts
         At the motion's samples.
 

@@ -37,7 +37,6 @@ class LevelBeyondEdge:
 
     Parameters
     ----------
-    terrain : Terrain
     places : (K, 2) float array
         World positions that have ground [m].
     """

@@ -27,7 +27,6 @@ class RaisedRest:
 
     Attributes
     ----------
-    character, sole : str
     frame : float
         Of the scene, at which the rest begins.
     place : (3,) float array

@@ -52,7 +52,6 @@ def equal_parts(points: Array, corner: Indices, edge: Indices, ends: Indices, co
         Its edges; the first lies opposite the first corner.
     ends : (E, 2) int array
         Points of each edge.
-    count : int
     grain : float
         1 / 2^n, of the length of an edge.
 

@@ -154,8 +154,6 @@ def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinemen
 
     Parameters
     ----------
-    surface : Surface
-    region : Region
     spacing : float
         Distance between vertices [m].
 

@@ -98,7 +98,6 @@ class CharacterMotion:
         Scene frame numbers, evenly spaced.
     frame_rate : float
         Scene frames per second [Hz].
-    soles : tuple of SoleMotion
     joints : dict of str to (F, 3) float array
         World positions of those of `JOINTS` that are mapped, and of `CENTRE` [m].
     gravity : float

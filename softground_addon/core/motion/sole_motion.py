@@ -125,7 +125,6 @@ class SoleMotion:
 
     Attributes
     ----------
-    sole : Sole
     transforms : (F, P, 4, 4) float array
         Patch frame to world, rotation and translation only [m]; of the one frame of a prop.
     bears : (F,) bool array or None

@@ -142,8 +142,6 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
 
     Parameters
     ----------
-    by : Pass
-    plant : Plant
     frame : float
         Scene frame.
     frame_rate : float

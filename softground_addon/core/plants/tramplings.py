@@ -76,12 +76,7 @@ class Tramplings:
 
 @sliced
 def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
-    """Passes of the soles that left footprints; None without any.
-
-    Parameters
-    ----------
-    footprints : iterable of Footprint
-    """
+    """Passes of the soles that left footprints; None without any."""
     steps = sorted((step for step in footprints if len(step.contact_cells)), key=lambda step: step.start_frame)
     if not steps:
         return None

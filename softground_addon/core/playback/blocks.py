@@ -22,7 +22,6 @@ class ChangesInBlocks:
 
     Parameters
     ----------
-    footprint : Footprint
     is_small : bool
         As of `PackedArray`.
     """

@@ -82,7 +82,6 @@ class Fit:
 
     Attributes
     ----------
-    ramps : Ramps
     error : (K, C) float array
         Largest difference of each value at each point, over time.
     """

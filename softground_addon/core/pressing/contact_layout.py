@@ -33,8 +33,6 @@ class ContactLayout(ABC):
 
     Parameters
     ----------
-    character : str
-    sole : Sole
     steps : Steps
         All of the contact.
     strength : float
@@ -68,9 +66,6 @@ class ContactLayout(ABC):
 
         Parameters
         ----------
-        start, end : int
-        cells : GroundCells
-        timing : Timing
         sinkage : float
             How far the ground has given way under the sole's lowest point by then [m].
         """

@@ -58,7 +58,6 @@ def target_compression(
     ----------
     stress : float array of any shape
         Normal stress [Pa]; over cells where the pressure varies under the sole.
-    material : GroundMaterial
     firmness : float
         See `GroundMaterial.firmness`.
     stiffness, depth : float or float array
@@ -83,7 +82,6 @@ def compression_rate(
     ----------
     step : float or float array
         Duration of the step [s].
-    material : GroundMaterial
     target : float or float array
         Compression that the stress leads to [m].
     landing_speed : float or float array
@@ -129,7 +127,6 @@ def sink(
         See `sole_points.touching_fraction` [m].
     step : float
         Time step [s].
-    material : GroundMaterial
     sinkage : float
         That reached before the first step [m].
     landing_speed : float

@@ -62,7 +62,6 @@ def plate_of(points: SolePoints, target: Array, rate: Any, softness: float) -> P
 
     Parameters
     ----------
-    points : SolePoints
     target : (N,) float array
         Compression that the load at each step, spread over the whole sole, leads to [m].
     rate : float or (N,) float array

@@ -45,7 +45,6 @@ class PropLayout(ContactLayout):
 
     Parameters
     ----------
-    character : str
     sole : Sole
         With a prop.
     steps : Steps

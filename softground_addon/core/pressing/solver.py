@@ -31,7 +31,6 @@ class GroundSolver:
 
     Parameters
     ----------
-    ground : SoftGround
     state : HeightField
         What was pressed of it so far; it is worked on.
     undisturbed : UndisturbedCells
@@ -62,10 +61,8 @@ class GroundSolver:
         ----------
         contacts : list of OpenContact
             Those that are open by its end; at last without those that have ended.
-        start, end : int
         frame : float
             Scene frame.
-        timing : Timing
         is_last : bool
             All contacts end.
 

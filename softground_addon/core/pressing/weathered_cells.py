@@ -25,7 +25,6 @@ class WeatheredCells:
 
     Parameters
     ----------
-    weathering : Weathering
     cell_size : float
         Side of a cell [m].
     """
@@ -67,7 +66,6 @@ class WeatheredCells:
 
         Parameters
         ----------
-        ground : HeightField
         imprints : Imprints
             Where it will press and raise the ground.
         level : float

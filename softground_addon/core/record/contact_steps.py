@@ -69,7 +69,6 @@ class PressingSole:
 
     Attributes
     ----------
-    sole : Sole
     flat : (P, 4, 4) float array
         Poses of its patches.
     """

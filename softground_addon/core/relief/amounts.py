@@ -80,15 +80,10 @@ class Amounts:
         Of the outline and all that lies along it.
     bends_with_depth : bool
         True if walls are bent at each depth otherwise.
-    chunks : Chunks or None
     ledges : tuple of Bend
         Offsets of the wall, out or back, at each of its heights.
     wall : float
         Width of the wall seen from above; 0 keeps the walls that the simulation has.
-    tread : Tread or None
-    water : Water or None
-    layers : tuple of Layer
-    crumbs : Crumbs or None
     surface : str
         That the crumbs are of, see `core.ground.surfaces`.
     """

@@ -97,7 +97,6 @@ def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
 
     Parameters
     ----------
-    footprint : Footprint
     length, depth : float
         Of the print [m].
     """

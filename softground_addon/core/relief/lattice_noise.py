@@ -57,7 +57,6 @@ def noise(seed: int, size: float, *place: Array) -> Array:
 
     Parameters
     ----------
-    seed : int
     size : float
         From one value of the lattice to the next [m].
     *place : (N,) float arrays

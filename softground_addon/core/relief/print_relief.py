@@ -64,8 +64,6 @@ class PrintRelief:
 
     Parameters
     ----------
-    shape : PrintShape
-    amounts : Amounts
     seed : int
         The print's own.
     finest : float

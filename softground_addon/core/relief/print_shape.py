@@ -50,7 +50,6 @@ class PrintShape:
 
     Attributes
     ----------
-    window : Window
     cell_size : float
         Side of a cell [m].
     fields : (8, rows, columns) float array

@@ -88,7 +88,6 @@ def scattered(
 
     Parameters
     ----------
-    surface : str
     seed : int
         The print's own.
     low, high : (2,) float arrays

@@ -90,7 +90,6 @@ def relief_of_steps(
         In the order of their first contact.
     x, y : (K,) float arrays
         World positions [m].
-    wanted : ReliefSettings
     blur_sigma : float
         Standard deviation of the display blur [m].
     """

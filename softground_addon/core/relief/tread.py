@@ -121,7 +121,6 @@ class SoleTread:
 
     Attributes
     ----------
-    pattern : Pattern
     is_mirrored : bool
         True for left feet.
     """

@@ -25,7 +25,6 @@ def leaving_early(motion: CharacterMotion, touching: Mask, footprints: Sequence[
 
     Parameters
     ----------
-    motion : CharacterMotion
     touching : (F, S) bool array
         At its frames.
     footprints : sequence of Footprint

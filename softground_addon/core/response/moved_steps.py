@@ -54,7 +54,6 @@ class Followed:
         By sole, its level displacement.
     hips : (F, 2) float array
         Displacement of the hips [m].
-    out_of_reach : tuple of OutOfReach
     """
 
     carries: Mapping[int, Array] = field(default_factory=dict)
@@ -91,7 +90,6 @@ def follow(
     touching : (F, S) bool array
     footprints : sequence of Footprint
         As they were baked, of all characters.
-    edits : mapping of step id to StepEdit
     """
     moved = list(_moved(motion, touching, footprints, edits))
     if not moved:

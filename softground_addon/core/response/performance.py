@@ -94,7 +94,6 @@ def swing_change(path: Array, depth: Array, touching: Mask, performance: Perform
     depth : (F,) float array
         From `sinkage_over_time`.
     touching : (F,) bool array
-    performance : Performance
     leg_length : float [m]
     """
     progress = swing_progress(touching)
@@ -123,7 +122,6 @@ def raised_arms(
         Level direction in which the body faces.
     depth : (F,) float array
         From `body_depth` [m].
-    strength : float
     leg_length : float [m]
     """
     angle = strength * ARMS_OUT * np.clip(depth / (DEEP * leg_length), 0.0, 1.0)

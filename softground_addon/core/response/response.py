@@ -43,7 +43,6 @@ class TiltOptions:
 
     Attributes
     ----------
-    gains : TiltGains
     strength : float
         Part of the controller's lean that the body takes on.
     lateral : float
@@ -113,7 +112,6 @@ def respond(
         At scene frames.
     history : GroundHistory
         With all footprints that the ground holds, of all characters.
-    tilt, grounding : options, or None to leave that out
     standing : (F, S) bool array, optional
         Where grounded soles stand in their prints, if not as long as they touch (`leaving_early`).
     followed : Followed, optional

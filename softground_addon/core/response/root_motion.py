@@ -34,7 +34,6 @@ def lacking_velocity(motion: CharacterMotion, loads: CharacterLoads, terrain: Te
         At scene frames.
     loads : CharacterLoads
         Of the same motion, on its time grid.
-    terrain : Terrain
     """
     if treadmill_speed(loads.motion, loads.contacts) == 0.0:
         return None
@@ -56,7 +55,6 @@ def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -
     motion : CharacterMotion
         At scene frames.
     touching : (F, S) bool array
-    terrain : Terrain
     """
     floor = GroundHistory(terrain)
     frames, moves = [np.zeros(0, np.intp)], [np.zeros((0, 2))]

@@ -179,10 +179,8 @@ def body_motion(
     ----------
     name : str
         The character's.
-    body : BareBody
     mapping : RigMapping
         Its soles are on parts.
-    recording : Recording
     mass : float
         [kg]
     skin_mass : float

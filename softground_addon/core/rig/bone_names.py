@@ -117,7 +117,6 @@ def read_names(bones: RigBones, deforming: Set[str]) -> list[BoneName]:
 
     Parameters
     ----------
-    bones : RigBones
     deforming : set of str
         Names of those that move a mesh.
     """

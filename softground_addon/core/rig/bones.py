@@ -21,7 +21,6 @@ class RestBone:
     matrix : (4, 4) float array
         Its frame, whose y axis points from head to tail.
     head, tail : (3,) float arrays
-    length : float
     """
 
     parent: str

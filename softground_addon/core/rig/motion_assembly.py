@@ -63,10 +63,6 @@ def assemble_motion(
     ----------
     name : str
         The character's.
-    bones : RigBones
-    mapping : RigMapping
-    recording : Recording
-    skin : RigSkin or None
     mass : float
         [kg]
     carried : mapping of str to SoleMotion

@@ -24,7 +24,6 @@ class SceneUnits:
         Scene frames per second [Hz].
     time_stretch : float
         Frames of the animation per frame of the scene.
-    gravity_m_s2, unit_scale_m : float
     """
 
     frame_rate: float

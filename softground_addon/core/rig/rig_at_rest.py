@@ -28,7 +28,6 @@ class RestPose:
 
     Attributes
     ----------
-    bones : RigBones
     world : (4, 4) float array
         Armature space to world [m].
     tilts : (F, 3, 3) float array

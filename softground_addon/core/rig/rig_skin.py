@@ -93,8 +93,6 @@ def skinned(
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     chosen : (N,) int array
@@ -151,7 +149,6 @@ class FollowedSkin:
 
     Attributes
     ----------
-    motion : SkinMotion
     bones : tuple of str
         Bone of each part of the motion; empty where only the armature moves it.
     """
@@ -168,8 +165,6 @@ def followed_skin(
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     rate : float

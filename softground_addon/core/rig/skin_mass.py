@@ -23,8 +23,6 @@ def skin_mass(skin: RigSkin, bones: RigBones, pose: Recording) -> Slices[float]:
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     pose : Recording
         Of all `skin.bones`, at one frame.
     """
@@ -47,8 +45,6 @@ def centre_of_volume(skin: RigSkin, bones: RigBones, recording: Recording) -> Ar
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     """

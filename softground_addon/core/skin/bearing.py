@@ -40,7 +40,6 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
 
     Parameters
     ----------
-    tracks : PartTracks
     level : float
         Height of the ground [H].
     drift : (2,) float array

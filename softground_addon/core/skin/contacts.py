@@ -62,7 +62,6 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
 
     Parameters
     ----------
-    skin : SkinMotion
     groups : (P,) int array, optional
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """

@@ -42,7 +42,6 @@ def merged(tracks: PartTracks, bears: Mask, links: Mask, alike: Mask, twin: Indi
 
     Parameters
     ----------
-    tracks : PartTracks
     bears : (F, P) bool array
     links : (P, P) bool array
         Which parts hang together.

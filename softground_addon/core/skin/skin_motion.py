@@ -133,7 +133,6 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
 
     Parameters
     ----------
-    skin : SkinMotion
     group : (P,) int array, optional
         Number of the group that each part is in, to track groups in place of parts; -1 for none.
     floor : float

@@ -249,7 +249,6 @@ def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: floa
 
     Parameters
     ----------
-    flat : FlatFoot
     ankle_tip : (3,) float array
         End of the last bone of the foot in the rest pose [m].
     ball : (3,) float array or None

@@ -86,7 +86,6 @@ class PlacedSole:
 
     Attributes
     ----------
-    sole : Sole
     placements : (P, 4, 4) float array
         Patch frame to sole frame [m].
     """

@@ -33,7 +33,6 @@ class FeltWeather(Weather):
 
     Attributes
     ----------
-    surface : str
     first, last : float
         The scene frames that it is known in parts of.
     frame_rate : float
@@ -82,7 +81,6 @@ class PrintsInWeather:
 
     Parameters
     ----------
-    weather : FeltWeather
     layer_depth : float
         Of the loose layer [m].
 

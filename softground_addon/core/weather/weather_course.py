@@ -177,13 +177,10 @@ def steady_table(
     ----------
     weather : Weather
         Of numbers.
-    matter : Matter
     soaking : (float, float)
         Remaining shares of the hollows' soaking at which water is known.
-    ages : int
     per_frame : int
         Ages in a frame.
-    frame_rate : float
 
     Returns
     -------

@@ -94,7 +94,6 @@ def weather_places(
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     position : (K, 3) float array
         Their undisturbed world positions [m].
     relief : (K,) float array
