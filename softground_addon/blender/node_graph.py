@@ -384,8 +384,8 @@ _FUNCTIONS: Mapping[np.ufunc, Callable[..., Number]] = {
     np.maximum: Number.at_least,
     np.greater: Number.above,
     np.exp: Number.exp,
-    np.expm1: lambda one: one.exp() - 1.0,
-    np.log1p: lambda one: (one + 1.0).log(),
+    np.expm1: lambda number: number.exp() - 1.0,
+    np.log1p: lambda number: (number + 1.0).log(),
     np.sqrt: Number.root,
     np.arccos: Number.arccos,
 }

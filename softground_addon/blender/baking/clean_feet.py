@@ -132,8 +132,8 @@ def _cleaned(
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain, stands))
             feet[when][motion.name] = _statistics(faults)
         made = yield from meanwhile(now, gaps.slices(motion, touching, floor, posed_rim))
-        left = yield from meanwhile(now, gaps.slices(after, touching, floor, posed_rim))
-        responses.append(CharacterResponse(motion, response, made, left, 0.0))
+        remaining = yield from meanwhile(now, gaps.slices(after, touching, floor, posed_rim))
+        responses.append(CharacterResponse(motion, response, made, remaining, 0.0))
     return responses, feet, missed
 
 

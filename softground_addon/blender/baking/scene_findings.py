@@ -42,7 +42,9 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *(finding for motion in shot.motions for finding in _distance(motion, wanted)),
         *_idle_actions(followed, first, last),
         *_idle_drivers(followed),
-        *shape_findings(object_named(sole.object) for one in wanted.characters for sole in one.soles if sole.object),
+        *shape_findings(
+            object_named(sole.object) for character in wanted.characters for sole in character.soles if sole.object
+        ),
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
         *_gravity(scene, wanted),
@@ -145,13 +147,13 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
 
 def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
     """Bodies without an armature, whose contacts are parts of a shape that changes."""
-    for one in wanted.characters:
-        if one.body and any(map(deforms, meshes_of(settings.found(one.body)))):
+    for character in wanted.characters:
+        if character.body and any(map(deforms, meshes_of(settings.found(character.body)))):
             yield Finding(
                 "followed_shape",
                 "note",
-                f"'{one.name}' has no armature: its contacts {listed(sole.name for sole in one.soles)} are parts that "
-                "keep their shape while it changes.",
+                f"'{character.name}' has no armature: its contacts {listed(sole.name for sole in character.soles)} are "
+                "parts that keep their shape while it changes.",
                 "Check in Contacts that each foot is there, and remove what is none.",
             )
 

@@ -100,7 +100,7 @@ class Carried:
 
 def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
     """What a mesh carries; `groups` are the names of its vertex groups."""
-    coming = [one for one in source.attributes if one.data_type in LAYOUT and _comes_along(one.name)]
+    coming = [given for given in source.attributes if given.data_type in LAYOUT and _comes_along(given.name)]
     edges, loose = _EMPTY, np.ones(len(source.edges), dtype=bool)
     if len(source.loops):
         loose[_values(source.attributes[".corner_edge"])] = False  # a hundred times faster than `loops`
@@ -117,7 +117,7 @@ def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
         positions=mesh_arrays.positions(source),
         edges=edges,
         loose_edges=edges[loose] if loose.any() else _EMPTY,
-        layers=tuple(_Layer(one.name, one.data_type, one.domain, _values(one)) for one in coming),
+        layers=tuple(_Layer(given.name, given.data_type, given.domain, _values(given)) for given in coming),
         uv_maps=tuple((layer.name, bool(layer.active), bool(layer.active_render)) for layer in source.uv_layers),
         colours={choice: colours[index].name for choice, index in chosen.items() if 0 <= index < len(colours)},
         groups=tuple(groups),

@@ -200,10 +200,10 @@ class ModalJob(bpy.types.Operator):
     def _show_progress(self, progress: jobs.Progress) -> None:
         done = max(session.current().progress, self._done(progress))
         passed = time.perf_counter() - self._started
-        left = passed * (1.0 - done) / max(done, 1e-3)
+        remaining = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
         stage = translated(self.stage_names[progress.stage])
-        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(left))))
+        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(remaining))))
 
     def _show_status(self, progress: float, status: str) -> None:
         label, end = translated(self.bl_label), translated("[Esc] Cancel")

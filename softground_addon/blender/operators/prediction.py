@@ -104,14 +104,14 @@ def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction
     if depth is None:
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)
-        return DepthPrediction(known, state.told.get(scene.session_uid), is_current=False)
-    state.told[scene.session_uid] = depth
+        return DepthPrediction(known, state.shown_depths.get(scene.session_uid), is_current=False)
+    state.shown_depths[scene.session_uid] = depth
     return DepthPrediction(known, depth, is_current=True)
 
 
 def shown_cm(scene: bpy.types.Scene) -> float:
     """The depth that was shown last for a scene [cm]; 0 before."""
-    return (state.told.get(scene.session_uid) or 0.0) * 100
+    return (state.shown_depths.get(scene.session_uid) or 0.0) * 100
 
 
 def type_cm(scene: bpy.types.Scene, depth: float) -> None:
@@ -126,7 +126,7 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
         if known is None:
             return
         wanted = settings.snapshot(scene)
-        if bpy.app.background or depth / 100 > wanted.material.deepest or not state.told.get(scene.session_uid):
+        if bpy.app.background or depth / 100 > wanted.material.deepest or not state.shown_depths.get(scene.session_uid):
             modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
             scene.softground.material.youngs_modulus = modulus
         else:
@@ -145,8 +145,10 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     """
     material = scene.softground.material
     law = settings.snapshot(scene).material
-    material.youngs_modulus = next_modulus([(material.youngs_modulus, state.told[scene.session_uid])], depth, law)
-    state.told[scene.session_uid] = depth
+    material.youngs_modulus = next_modulus(
+        [(material.youngs_modulus, state.shown_depths[scene.session_uid])], depth, law
+    )
+    state.shown_depths[scene.session_uid] = depth
     state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
 
 

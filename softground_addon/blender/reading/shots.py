@@ -170,8 +170,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
     soft = yield from meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    own = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
-    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, own)
+    hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
+    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
 
 
@@ -181,9 +181,9 @@ def _with_hard(
     motions: list[CharacterMotion],
     ground: Terrain,
     bounds: Array,
-    own: Sequence[MeshTerrain] = (),
+    hard_parts: Sequence[MeshTerrain] = (),
 ) -> Job[tuple[Terrain, list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, own)
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, hard_parts)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 

@@ -57,7 +57,7 @@ class CarriedMass:
     on_soles: float = 0.0
 
     def __add__(self, other: CarriedMass) -> CarriedMass:
-        return CarriedMass(*(one + more for one, more in zip(vars(self).values(), vars(other).values(), strict=True)))
+        return CarriedMass(*(mass + more for mass, more in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
 def zone_of(along: Array) -> NDArray[np.intp]:
@@ -117,8 +117,8 @@ def carry(
             booked += CarriedMass(picked_up=picked_up, shed=meeting.shed)
         else:
             gives = np.where(now < TRACE * carried.most, 0.0, now)
-            left = gives * meeting.shares
-            now = now - left
-            booked += CarriedMass(left_behind=float(left @ areas))
+            left_behind = gives * meeting.shares
+            now = now - left_behind
+            booked += CarriedMass(left_behind=float(left_behind @ areas))
         giving.append(gives)
     return giving, replace(booked, on_soles=float(now @ areas))

@@ -168,13 +168,13 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
     height = position[grid.faces, 2]
     is_even = np.ptp(height, axis=1) <= STEEPEST * grid.spacing  # false where a corner has no floor
     faces = grid.faces[is_even & (largest[grid.faces] > 0).any(axis=1)]
-    kept = np.zeros(len(largest), bool)
-    kept[faces] = True
+    retained = np.zeros(len(largest), bool)
+    retained[faces] = True
     touched = np.where(largest > 0, (pressure > 0).argmax(axis=0), len(pressure))
     first = touched[faces].min(axis=1, initial=len(pressure))
     beside = touched.copy()
     np.minimum.at(beside, faces, first[:, None])
-    return HardPrint(position, largest * kept, np.where(largest > 0, touched, beside), faces)
+    return HardPrint(position, largest * retained, np.where(largest > 0, touched, beside), faces)
 
 
 def _floor(terrain: HardOnSoft, x: Array, y: Array, limit: Array) -> Array:

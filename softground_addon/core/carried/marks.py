@@ -124,7 +124,7 @@ def marks_of(
             for during in _pieces(hard[:, index], slid := _slid(character, index)):
                 contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
                 yield
-            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
+            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda meeting: meeting.frame)
             giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
             booked += of_sole
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}

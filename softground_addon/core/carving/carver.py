@@ -169,9 +169,9 @@ class CarvedCells:
             room = np.maximum(most, 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
-                if remaining <= ROUNDING or not (there := share.sum()):
+                if remaining <= ROUNDING or not (total := share.sum()):
                     break
-                more = np.minimum(share * (remaining / there), room)
+                more = np.minimum(share * (remaining / total), room)
                 self.loose += more
                 room -= more
                 remaining -= float(more.sum())

@@ -126,8 +126,8 @@ def _soles_of_bones(worn: WornSkin) -> Indices:
             if bone:
                 for name in {*family(worn.bones, bone), *above(worn.bones, bone)}:
                     owners.setdefault(name, set()).add(number)
-    found = []
+    soles = []
     for name in worn.skin.bones:
         owned = next((owners[bone] for bone in (name, *above(worn.bones, name)) if bone in owners), set[int]())
-        found.append(next(iter(owned)) if len(owned) == 1 else NO_SOLE)
-    return np.array(found, dtype=np.intp)
+        soles.append(next(iter(owned)) if len(owned) == 1 else NO_SOLE)
+    return np.array(soles, dtype=np.intp)

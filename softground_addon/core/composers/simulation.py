@@ -16,7 +16,6 @@ from ..ground.sparse_grid import Window
 from ..imprints.sole_points import SolePoints, flat_pose, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
-from ..motion.sole_motion import Sole
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -154,7 +153,7 @@ class _Waiting:
             earlier = self._latest.get(contact.of)
             goes_on = earlier is not None and earlier.layout.end == contact.since
             layout = contact.layout(self._frames)
-            opened = OpenContact(layout, earlier if goes_on else None, contact.kept(layout.steps))
+            opened = OpenContact(layout, earlier if goes_on else None, contact.recorded(layout.steps))
             self._latest[contact.of] = opened
             yield opened
 
@@ -185,7 +184,7 @@ class ShotContact:
     points: SolePoints | None
     pressing: PressingSole | None
 
-    def kept(self, steps: Steps) -> ContactSteps | None:
+    def recorded(self, steps: Steps) -> ContactSteps | None:
         """What its footprint keeps of its steps."""
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
@@ -206,10 +205,6 @@ class ShotContact:
         if self.points is None:
             return PropLayout(motion.name, sole, steps)
         return SoleLayout(motion.name, sole, steps, self.points)
-
-
-def _is_kept(sole: Sole) -> bool:
-    return sole.prop is None or len(sole.prop.vertices) <= MOST_VERTICES
 
 
 def contacts_of(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[ShotContact]:

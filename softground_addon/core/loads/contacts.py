@@ -183,9 +183,9 @@ def _shown(touching: Mask, seen: Contacts) -> Mask:
     shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
     for sole in np.flatnonzero(seen.touching.any(axis=0)):
         for first, last in zip(*runs(seen.touching[:, sole]), strict=True):
-            told = np.flatnonzero(shown[first:last, sole])
-            if len(told):  # it does not leave and land again while its skin bears on
-                shown[first + told[0] : first + told[-1], sole] = True
+            seen_at = np.flatnonzero(shown[first:last, sole])
+            if len(seen_at):  # it does not leave and land again while its skin bears on
+                shown[first + seen_at[0] : first + seen_at[-1], sole] = True
             if shown[first:last, sole].mean() < SURE:
                 shown[first:last, sole] = True
         bears, clearance = seen.touching[:, sole], seen.clearance[:, sole]

@@ -94,8 +94,8 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
     origin, tile, tiles, slot = _tiled(cells)
     order = np.lexsort((table["start"], slot))
     slot, table = slot[order], {name: values[order] for name, values in table.items()}
-    kept, table = _in_turn(slot, table)
-    slot = slot[kept]
+    chosen, table = _in_turn(slot, table)
+    slot = slot[chosen]
     first = np.concatenate([[0], np.cumsum(np.bincount(slot, minlength=int(tiles.max()) + tile**2))])
     is_next = np.concatenate([[False], slot[1:] == slot[:-1]])
     active = table["start"] - TALLEST / table["down"]
@@ -146,11 +146,11 @@ def _in_turn(slot: Indices, table: dict[str, Array]) -> tuple[Indices, dict[str,
         return np.asarray(sums - (sums[begins] - values[begins])[of_slot])
 
     trodden = summed(table["passes"])
-    kept = np.flatnonzero((table["passes"] > 0) | (trodden == 0))
-    last = np.append(kept[1:], len(slot)) - 1
-    result = {name: values[kept] for name, values in table.items()}
+    taken = np.flatnonzero((table["passes"] > 0) | (trodden == 0))
+    last = np.append(taken[1:], len(slot)) - 1
+    result = {name: values[taken] for name, values in table.items()}
     for name in ("lasting", "passes"):
-        result[name] = summed(table[name])[kept]
+        result[name] = summed(table[name])[taken]
     for name in ("sink", "slope_x", "slope_y"):
         result[name] = summed(table[name])[last]
-    return kept, result
+    return taken, result

@@ -56,7 +56,7 @@ class Tread:
     """Height of a tread's ridges [mm], and the parts of it that are lost in the best and worst places."""
 
     height: float
-    kept: float = 0.0
+    least_lost: float = 0.0
     lost: float = 0.7
 
 

@@ -257,10 +257,10 @@ class PrintRelief:
         for drag in self._drags:
             ridges = ridges * drag.spared(around)
         if self._tread.is_flesh:
-            height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.kept)
+            height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.least_lost)
             return ridges * around.pressed * height * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
-        lost = tread.kept + (tread.lost - tread.kept) * worn * worn
+        lost = tread.least_lost + (tread.lost - tread.least_lost) * worn * worn
         within = smooth_step((around.inward - around.length(3.0)) / around.length(6.0))
         return ridges * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
 

@@ -159,11 +159,11 @@ def _joint(body: BareBody, foot: str, toes: str, recording: Recording) -> Array:
     gap = np.linalg.norm(far[:, None] - near, axis=-1)
     touching = gap.min(axis=1) <= gap.min() + JOINT * np.ptp(far, axis=0).max()
     start = far[touching].mean(axis=0)
-    one, other = (
+    first, other = (
         np.swapaxes(recording.poses[:, number], 1, 2) @ np.linalg.inv(body.bones[name].matrix)
         for number, name in zip(numbers, (foot, toes), strict=True)
     )
-    apart = one - other
+    apart = first - other
     turns, gaps = apart[:, :3, :3].reshape(-1, 3), (apart[:, :3, :3] @ start + apart[:, :3, 3]).ravel()
     return np.asarray(start - np.linalg.solve(turns.T @ turns + STIFF * len(apart) * np.eye(3), turns.T @ gaps))
 

@@ -31,9 +31,9 @@ def moving_alike(skin: SkinMotion) -> Mask:
     if skin.twin is not None:
         followed = np.flatnonzero(skin.twin >= 0)
         alike[followed, skin.twin[followed]] = False
-    for one, other in zip(*np.nonzero(alike), strict=True):
-        apart = np.linalg.norm(middle[:, one] - middle[:, other], axis=-1)
-        alike[one, other] = np.ptp(apart) < ALIKE * skin.height
+    for this, other in zip(*np.nonzero(alike), strict=True):
+        apart = np.linalg.norm(middle[:, this] - middle[:, other], axis=-1)
+        alike[this, other] = np.ptp(apart) < ALIKE * skin.height
     return alike & alike.T
 
 
