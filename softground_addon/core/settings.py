@@ -13,7 +13,6 @@ from enum import IntEnum
 from typing import Any
 
 from .ground.camera_view import CameraView
-from .ground.display_spacing import spacing_of
 from .ground.material import UNSAID, GroundMaterial, Pressure
 from .ground.regions import GroundKind, numbered
 from .loads.cell_limits import Fineness
@@ -220,7 +219,7 @@ class BakeSettings(SceneUnits):
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
-        return spacing_of(self.cell_size_m, self.relief)
+        return self.fineness.spacing
 
     @property
     def kinds(self) -> tuple[tuple[GroundKind, ...], dict[int, float]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ...core.events import event_edl, event_json, event_midi, event_otio, event_reaper
+from ...core.events import event_files, event_midi
 from ...core.events.events import Event, between
 from ...core.files import files
 
@@ -17,7 +17,7 @@ KINDS: dict[str, tuple[str, str, str, Dump]] = {
         ".jsonl",
         "Events (JSON Lines)",
         "Heel strikes, toe-offs and slides, for game engines",
-        lambda table, rate: event_json.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.json_lines(table, frame_rate=rate),
     ),
     "EVENTS_MIDI": (
         ".mid",
@@ -29,19 +29,19 @@ KINDS: dict[str, tuple[str, str, str, Dump]] = {
         ".csv",
         "Events (Reaper)",
         "Regions and markers for Reaper",
-        lambda table, _rate: event_reaper.dump(table),
+        lambda table, _rate: event_files.reaper(table),
     ),
     "EVENTS_EDL": (
         ".edl",
         "Events (Resolve)",
         "Timeline markers for DaVinci Resolve",
-        lambda table, rate: event_edl.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.edl(table, frame_rate=rate),
     ),
     "EVENTS_OTIO": (
         ".otio",
         "Events (OpenTimelineIO)",
         "Timeline markers for editors",
-        lambda table, rate: event_otio.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.otio(table, frame_rate=rate),
     ),
 }
 """Formats: suffix, label and description for the user, and the writer."""
