@@ -109,4 +109,5 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
 
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
-    return staleness.reasons(scene, weather.felt(settings.snapshot(scene)))
+    wanted = weather.felt(settings.snapshot(scene))
+    return staleness.reasons(scene.softground.ground, scene.objects, wanted)

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...core.findings import Finding, listed
 from ...core.motion.motion import CharacterMotion
@@ -47,17 +48,17 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         ),
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
-        *_gravity(scene, wanted),
+        *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
 
 
-def _gravity(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
     """Gravity that does not point down."""
-    if scene.use_gravity and scene.gravity.length > 0 and -scene.gravity.normalized().z < UPRIGHT:
+    if gravity.length > 0 and -gravity.normalized().z < UPRIGHT:
         yield Finding(
             "gravity_direction",
             "note",
-            f"Gravity of scene '{scene.name}' points along ({', '.join(f'{part:g}' for part in scene.gravity)}), but "
+            f"Gravity of scene '{wanted.scene}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
             f"bodies weigh straight down in a bake, by {wanted.gravity_m_s2:.2f} m/s².",
             "Turn the shot so that down is -Z, and set Gravity in the Scene properties to match.",
         )

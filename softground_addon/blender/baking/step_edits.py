@@ -57,11 +57,6 @@ class EditableBake:
         return EditedSteps.left_with(self.steps, self.left, edits)
 
 
-def editable(scene: bpy.types.Scene) -> EditableBake:
-    """The bake on the scene's ground, to be edited; errors as of `reading`."""
-    return jobs.run(reading(scene))
-
-
 def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     """The bake on the scene's ground, to be edited, in steps.
 

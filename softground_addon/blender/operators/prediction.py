@@ -91,21 +91,21 @@ def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]
             bpy.app.timers.register(look_anew, persistent=True)
     if scene.session_uid not in state.seen:
         wanted = settings.snapshot(scene)
-        state.seen[scene.session_uid] = wanted, _prediction(scene, wanted)
+        state.seen[scene.session_uid] = wanted, _prediction(scene.session_uid, analysis.known(scene, wanted), wanted)
     seen: tuple[BakeSettings, DepthPrediction | None] = state.seen[scene.session_uid]
     return seen
 
 
-def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction | None:
-    known = analysis.known(scene, wanted)
+def _prediction(uid: int, known: Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
+    """The prediction for the scene of a session uid, by what is known of its shot."""
     if known is None:
         return None
     depth = analysis.known_depth(known, wanted)
     if depth is None:
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)
-        return DepthPrediction(known, state.shown_depths.get(scene.session_uid), is_current=False)
-    state.shown_depths[scene.session_uid] = depth
+        return DepthPrediction(known, state.shown_depths.get(uid), is_current=False)
+    state.shown_depths[uid] = depth
     return DepthPrediction(known, depth, is_current=True)
 
 

@@ -84,24 +84,24 @@ def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], so
         ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(renewed)
 
 
-def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
+def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: BakeSettings) -> tuple[str, ...]:
     """What has changed since the bake on a ground, for the user to read; nothing where there is none.
 
     Parameters
     ----------
+    objects : iterable of bpy.types.Object
+        Those of the scene.
     wanted : BakeSettings
         What a bake would be made with now.
     """
-    deletion = _deletion_of(scene.softground.ground)
+    deletion = _deletion_of(ground)
     if deletion or wanted.ground is None:
         return deletion
     ground = settings.found(wanted.ground)
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
-    if edited := next(
-        (obj for obj in (ground, display_mesh, *bodies_of(scene.objects, wanted)) if obj.mode == "EDIT"), None
-    ):
+    if edited := next((obj for obj in (ground, display_mesh, *bodies_of(objects, wanted)) if obj.mode == "EDIT"), None):
         return (translated("'{name}' is in Edit Mode", name=edited.name),)
     if playback.modifier_of(display_mesh) is None:
         text = "'{name}' has lost its playback modifier, and its prints no longer move"
@@ -109,11 +109,9 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         of_settings = _of_settings(wanted.inputs(Acts.WRITING))
-        now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(scene.objects, wanted)}
+        now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(objects, wanted)}
         soles = {key: value for key, value in then.items() if key.startswith(f"{SOLE}:")}
-        now |= soles | of_soles(
-            scene.objects, [key.removeprefix(f"{SOLE}:") for key in soles]
-        )  # those that are gone last
+        now |= soles | of_soles(objects, [key.removeprefix(f"{SOLE}:") for key in soles])  # those that are gone last
         left_out = () if then.pop(VERSION, "") == SERIES else _OF_VERSION
         changed = [(kind, name) for kind, name in _changes(then, now) if kind not in left_out]
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):

@@ -133,7 +133,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             else:
                 if step.name not in session.chosen_steps():
                     session.choose_steps(step.name)
-                preview = StepPreview(scene.softground.ground, step_edits.editable(scene))
+                preview = StepPreview(scene.softground.ground, jobs.run(step_edits.reading(scene)))
                 mouse = _on_plane(region, view, event, step.height)
                 mouse = step.baked.position[:2] if mouse is None else mouse
                 self._drag = _Drag(step, baked_steps.chosen(scene.softground.ground), preview, mouse, step.edit)

@@ -82,7 +82,7 @@ def pressed(operator, **values):
 def edit_a_step(chance, scene):
     """Change a step of the bake, where there is one that can be."""
     try:
-        bake = step_edits.editable(scene)
+        bake = jobs.run(step_edits.reading(scene))
         name = step_id(chance.choice(bake.left.footprints))
         jobs.run(
             step_edits.editing(

@@ -188,7 +188,7 @@ def test_wind_and_amount_act_at_once(scene):
 def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     ground = scene.softground.ground
     before = fingerprints.of_mesh(debris_object.of(ground).data)
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     number = int(values(debris_object.of(ground), "step")[0])
     jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[number]): StepEdit(mute=True)}))
     assert set(values(debris_object.of(ground), "step")) == set(bake.left.thrown) - {number}
@@ -199,7 +199,7 @@ def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
 def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     """Moved, deepened, scaled and shifted in time, muted, and a copy on an earlier print."""
     ground = scene.softground.ground
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     names = [step_id(one) for one in bake.left.footprints]
     edits = {
         names[0]: StepEdit(move_m=(0.3, 0.2), turn_deg=40.0),
@@ -235,7 +235,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
 
 def test_no_piece_stays_where_a_print_is_dragged_away_from_under_it(scene):
     obj = debris_object.of(scene.softground.ground)
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     step = bake.left.steps[1]
     before = fingerprints.of_mesh(obj.data)
     place, radius = places_of(obj)[:, :2], values(obj, "radius")
@@ -255,7 +255,7 @@ def test_no_piece_stays_where_a_print_is_dragged_away_from_under_it(scene):
 def test_debris_that_was_deleted_stays_away_from_edited_steps(scene):
     ground = scene.softground.ground
     bpy.data.objects.remove(debris_object.of(ground))
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[0]): StepEdit(strength=0.5)}))
     assert debris_object.of(ground) is None
 

@@ -216,13 +216,13 @@ def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     before = fingerprints.of_file()
     step = baked_steps.of(baked.softground.ground)[2]
     edits = {step.name: StepEdit(move_m=(0.0, 0.3))}
-    preview = StepPreview(ground, step_edits.editable(baked))
+    preview = StepPreview(ground, jobs.run(step_edits.reading(baked)))
     preview.show({step.name: StepEdit(move_m=(0.1, 0.2))})
     preview.show(edits)
     shown = heights(ground, DISPLAY_KEY)
     preview.end()
     assert fingerprints.of_file() == before
-    jobs.run(step_edits.editing(baked, step_edits.editable(baked), edits))
+    jobs.run(step_edits.editing(baked, jobs.run(step_edits.reading(baked)), edits))
     np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
 
 
