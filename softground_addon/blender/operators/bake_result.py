@@ -22,7 +22,7 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
     _result(layout, summary)
     warnings = ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground))
     _warnings(layout, warnings)
-    remedies.draw(layout.column(align=True), options.id_data.softground, warnings, session.current().stale)
+    remedies.draw(layout.column(align=True), options, warnings, session.current().stale)
     _floating_feet(layout, options, summary)
 
 
