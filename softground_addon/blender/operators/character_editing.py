@@ -18,21 +18,17 @@ from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
 from ..translation import translated
 from .modal_job import Reading, Reports
+from .panel_base import chosen_of, remove_chosen
 
 
 def active_character(options: Any) -> Any:
     """The character that is chosen in the list, or None."""
-    if 0 <= options.active_character < len(options.characters):
-        return options.characters[options.active_character]
-    return None
+    return chosen_of(options, "characters", "active_character")
 
 
 def active_sole(options: Any) -> Any:
     """The sole that is chosen in the list of the active character, or None."""
-    character = active_character(options)
-    if character and 0 <= character.active_sole < len(character.soles):
-        return character.soles[character.active_sole]
-    return None
+    return chosen_of(active_character(options), "soles", "active_sole")
 
 
 class _OnCharacter:
@@ -76,9 +72,7 @@ class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        options = settings.options_of(context)
-        options.characters.remove(options.active_character)
-        options.active_character = max(0, min(options.active_character, len(options.characters) - 1))
+        remove_chosen(settings.options_of(context), "characters", "active_character")
         return {"FINISHED"}
 
 
@@ -237,9 +231,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        character = active_character(settings.options_of(context))
-        character.soles.remove(character.active_sole)
-        character.active_sole = max(0, min(character.active_sole, len(character.soles) - 1))
+        remove_chosen(active_character(settings.options_of(context)), "soles", "active_sole")
         return {"FINISHED"}
 
 

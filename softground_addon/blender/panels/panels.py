@@ -18,7 +18,7 @@ from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, draw_list
 from ..settings import is_prop, is_set_up
 from ..translation import translated
 from . import outdated, preset_menu
@@ -63,13 +63,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             if nobody:
                 layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
             return
-        row = layout.row()
-        row.template_list(
-            "SOFTGROUND_UL_characters", "", options, "characters", options, "active_character", rows=1, maxrows=5
-        )
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_character", text="", icon="ADD")
-        buttons.operator("softground.remove_character", text="", icon="REMOVE")
+        draw_list(layout, options, "characters", "active_character", "character", rows=1, most=5)
         character = active_character(settings.options_of(context))
         if character:
             if not is_set_up(character):
@@ -153,11 +147,7 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
         layout = self.fields()
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
-        row = layout.row()
-        row.template_list("SOFTGROUND_UL_soles", "", character, "soles", character, "active_sole", rows=3, maxrows=6)
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_sole", text="", icon="ADD")
-        buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        draw_list(layout, character, "soles", "active_sole", "sole", rows=3)
         layout.operator("softground.add_contact", icon="PLUS")
         sole = active_sole(scene.softground)
         if not sole:
