@@ -8,11 +8,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ..compat import new_channels, new_curve, set_slot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

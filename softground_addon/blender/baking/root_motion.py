@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
@@ -23,8 +23,6 @@ from ..reading.shots import estimate_shot, read_shot, settings_of
 from ..response.response_job import Layer, show_layer
 from ..response.rig_controls import travelling_bone
 from ..translation import translated
-
-Array = NDArray[np.float64]
 
 SPEED = "softground_travel_speed"
 """Note of the speed of the travel [m/s]."""

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array
 from ...core.record.edits import StepEdit, mesh_soles, with_meshes
 from ...core.record.mesh_sole import LONGEST, SHORTEST, MeshSole
 from ...core.settings import BakeSettings

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.variation import CHANNELS
+from ...core.numerics.arrays import Array
 from ..properties import SoftGroundPainted
-
-Array = NDArray[np.float64]
 
 _SETTINGS = dict(zip(CHANNELS, ("stiffness", "layer_depth", "rim"), strict=True))
 """The setting that names what each channel is painted with."""

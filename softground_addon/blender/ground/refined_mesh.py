@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.refinement import Refinement, Surface
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import own_data
 from ..settings import found
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LAYOUT = {
     "FLOAT": ("value", 1, np.float32),

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.capture import amass, c3d, trc
 from ...core.capture.captured import Capture, Plate
@@ -18,13 +17,12 @@ from ...core.capture.joint_centres import UPWARD, CapturedBody, captured_body
 from ...core.capture.skeleton import Skeleton, skeleton_of
 from ...core.errors import InputError
 from ...core.files import files
+from ...core.numerics.arrays import Array
 from ...core.numerics.orientation import quaternions, without_leaps
 from ..animation_layer.layer_curves import LayerCurve, assign_action, new_action
 from ..operator_base import reports_errors
 from ..settings import frame_rate_of, scene_of, units_of
 from ..translation import translated
-
-Array = NDArray[np.float64]
 
 LARGEST = 2**29
 """Size of a file that is read [bytes]."""

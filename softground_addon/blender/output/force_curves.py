@@ -11,21 +11,19 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, StringProperty
-from numpy.typing import NDArray
 
 from ...core.errors import SoftGroundError
 from ...core.files import files
 from ...core.loads.deviation import force_deviation
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
+from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
 from ..translation import translated
-
-Array = NDArray[np.float64]
 
 FORCE, CONTACT = "force", "contact"
 """Endings of the properties' names, after a sole's name."""

@@ -13,8 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.prediction import (
     ShotContacts,
@@ -28,6 +26,7 @@ from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import Coverage, coverage_of
 from ...core.loads.estimate import CharacterLoads
+from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
@@ -35,8 +34,6 @@ from ..ground import ground_surface
 from ..state import state
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
-
-Array = NDArray[np.float64]
 
 TRIALS = 3
 """Moduli that a match may press all contacts with: one is enough unless other contacts become typical."""

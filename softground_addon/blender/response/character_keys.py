@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.legs.grounding import Response
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import quaternions
 from ...core.numerics.rigid import carried
@@ -21,8 +21,6 @@ from ..sampling.control_poses import RigPoses
 from ..sampling.rig_checks import check_bones
 from ..settings import found
 from .rig_controls import BODY, Control, find_controls
-
-Array = NDArray[np.float64]
 
 ANGLE_TOLERANCE = np.radians(0.04)
 """Largest error of angles between keys [rad]: a leg has four joints whose errors add."""

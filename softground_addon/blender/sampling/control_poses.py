@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.carving.responded_skin import WornSkin
+from ...core.numerics.arrays import Array
 from ...core.rig.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 class RigPoses:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
 from ...core.motion.sole_motion import SoleMotion
+from ...core.numerics.arrays import Array
 from ...core.rig.mapping import SoleSource
 from ...core.soles.prop_motion import prop_motion
 from .. import mesh_arrays

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
-from ...core.rig.rig_skin import Indices, RigSkin, Shape
+from ...core.rig.rig_skin import RigSkin, Shape
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.surfaces import CarriedFilm
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 ZONES = ("heel", "arch", "ball", "toes")
 ZONE_ENDS = (0.30, 0.55, 0.80)

@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.hard_ground import HardOnSoft, up_to
 from ..ground.terrain import SAME_LAYER
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction, distance_beyond
 from .film import zone_of
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ALONG_SOLE = 14
 """Nodes of the grid along a sole: 2 cm for an adult. The outline between them is that of the distances to it."""

@@ -18,13 +18,12 @@ from ..ground.surfaces import CarriedFilm
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.record import EditableStep
 from .film import ZONES, CarriedMass, Meeting, carry, share_left
 from .hard_print import HardPrint, SoleGrid, laid, sole_grid
-
-Array = NDArray[np.float64]
 
 LOOKED_AT = 32
 """Steps of a contact at which it is looked at, about."""

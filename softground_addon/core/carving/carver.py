@@ -16,14 +16,11 @@ from dataclasses import dataclass
 from math import ceil, pi, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.material import GroundMaterial
 from ..ground.surfaces import SurfaceRecord
+from ..numerics.arrays import Array, Mask
 from ..pressing.repose import slid
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""

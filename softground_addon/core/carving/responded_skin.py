@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from ..legs.grounding import Response, leg_soles
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Indices
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
 from ..rig.recording import Recording
 from ..rig.rig_skin import RigSkin, carried, skinned
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 NO_SOLE = -1
 """In place of the sole of skin that belongs to several, as a trunk does."""

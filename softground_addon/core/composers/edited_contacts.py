@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..motion.sole_motion import SolePatch
+from ..numerics.arrays import Array
 from ..numerics.rigid import inverse, rotation, turn_between, unit
 from ..record.contact_steps import PressingSole, Steps
 from ..record.edits import StepEdit
-
-Array = NDArray[np.float64]
 
 
 def edited_contact(

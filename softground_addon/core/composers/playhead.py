@@ -12,13 +12,12 @@ from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..pressing.ground_cells import UndisturbedCells
 from ..record.footprints import Footprint
 from .simulation import FrameResult, Simulation
-
-Array = NDArray[np.float64]
 
 NEWEST = 48
 """Frames at the end of what is shown that are pressed anew first: two steps of a walk at least."""

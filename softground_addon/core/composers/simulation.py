@@ -16,6 +16,7 @@ from ..ground.sparse_grid import Window
 from ..imprints.sole_points import SolePoints, flat_pose, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
+from ..numerics.arrays import Array
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -24,8 +25,6 @@ from ..pressing.sole_layout import SoleLayout
 from ..pressing.solver import GroundSolver
 from ..record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
 from ..record.footprints import Footprint
-
-Array = NDArray[np.float64]
 
 MOST_VERTICES = 20_000
 """Most vertices of a contact shape that is kept with its prints, so that they can be moved."""

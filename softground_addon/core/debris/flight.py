@@ -10,10 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import among, cells_of, keys_of
 from ..numerics.slices import Slices, sliced
-
-Array = NDArray[np.float64]
 
 HALVINGS = 20
 """Of the time between a landing on level ground that is too early and one that is too late: to its millionth part."""

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CENTRE, CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 PRESSED_DEPTH = 0.01
 """Landmarks this much higher than the lowest one bear e times less of the pressure, in leg lengths."""

@@ -6,13 +6,11 @@ from copy import copy
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .sparse_grid import TILE, SparseGrid, Window
 
 Grid = TypeVar("Grid", bound=SparseGrid)
-
-Array = NDArray[np.float64]
 
 WIDE = TILE // 4
 """Cells on each side of a kernel beyond which it costs less to blur all in one direction, and that in the other."""

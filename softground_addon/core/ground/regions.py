@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .material import GroundMaterial
 from .sparse_grid import Window
 from .terrain import MeshTerrain
-
-Array = NDArray[np.float64]
 
 MOST = 16
 """Kinds of ground that one ground may have."""

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ..ground.heightfield import Surface
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array
 from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
 from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps, touching_fraction
 
-Array = NDArray[np.float64]
 PatchOverCells = tuple[NDArray[np.intp], Single, Single]
 """See `patches_over_cells`."""
 

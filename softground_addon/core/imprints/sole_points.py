@@ -10,17 +10,14 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.04
 """What counts as touching, in sole lengths: 1 cm for an adult, the give of a shoe and the error of a pose."""

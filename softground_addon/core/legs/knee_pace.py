@@ -15,12 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.banded import solve_banded
 from ..numerics.slices import Slices, sliced
 from .legs import Leg
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _FRAME = 1 / 30
 """The time that the pace of a knee refers to [s]."""

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array
 from .estimate import CharacterLoads
 from .tracks import tracks
-
-Array = NDArray[np.float64]
 
 BYTES_PER_VERTEX = 900.0
 """What a vertex of the display mesh that moves takes [bytes], on figures of 2 cm to 7 m with cells of 0.4 to 20 mm."""

@@ -17,12 +17,11 @@ from ..dynamics.body_dynamics import FREE_FALL, BodyDynamics, flights
 from ..dynamics.centre_of_pressure import extents, lowest_points
 from ..dynamics.load_sharing import whole_body_shares
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import close_short, runs
 from ..numerics.smoothing_spline import smooth_path
 from .contacts import EDGE_CUTOFF, LEAVE_HEIGHT, TOUCH_SPEED, Contacts
 from .sliding import treadmill_velocity
-
-Array = NDArray[np.float64]
 
 SEARCH = 0.33
 """How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
@@ -26,9 +27,6 @@ from .clearances import clearances
 
 if TYPE_CHECKING:
     from ..ground.heightfield import Terrain
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOUCH_HEIGHT = 0.025
 """A sole lower than this starts to touch, in leg lengths (2 cm for an adult)."""

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
 from .contacts import Contacts
 from .forces import UP, ContactForces
-
-Array = NDArray[np.float64]
 
 FEWEST = 3
 """What is seen for fewer samples between two jumps bears nothing."""

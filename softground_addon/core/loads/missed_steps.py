@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from ..findings import Finding
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Mask
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
 from .sliding import treadmill_velocity
-
-Mask = NDArray[np.bool_]
 
 REST_TIME = 0.5
 """A sole that stands rests for longer than this, in sqrt(leg length/gravity) (0.15 s for an adult): one at the top of a

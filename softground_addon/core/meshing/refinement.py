@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.slices import Slices, sliced
 from ..numerics.triangles import enumerated
 from .bisection import Bisection, longest_sides
 from .region import Region
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Numbers = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 COARSEST_LEG = 2.0**0.25
 """Largest leg of a half square, in cells: halving areas leaves legs from 0.84 to 1.19 cells, about 1 in the middle."""

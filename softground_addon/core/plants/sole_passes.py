@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from ..record.footprints import Footprint
 from .bending import Pass, lasting_of
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 BESIDE = 0.05

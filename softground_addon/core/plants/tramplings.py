@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from .bending import Pass
 from .sole_passes import COLUMNS, OF_PASS, passes_of
 from .swings import swings
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CELL = 0.025

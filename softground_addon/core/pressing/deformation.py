@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from ..ground.ground_law import loose_strain, packed, strain
 from ..ground.material import GroundMaterial
 from ..imprints.sole_points import touching_fraction
+from ..numerics.arrays import Array, Mask
 from .plate import Plate
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Fraction = NDArray[np.floating[Any]]
 
 

@@ -14,8 +14,7 @@ from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, VariationTiles
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 
 @dataclass(frozen=True)

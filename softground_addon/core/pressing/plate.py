@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..imprints.sole_points import SolePoints
+from ..numerics.arrays import Array
 
-Array = NDArray[np.float64]
 Pressure = NDArray[np.floating[Any]]
 
 FALL_TIME = 0.06

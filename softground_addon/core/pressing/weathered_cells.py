@@ -9,15 +9,12 @@ from __future__ import annotations
 from math import fsum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import Weathering
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array, Mask
 from .ground_cells import Imprints
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 class WeatheredCells:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array
 from ..numerics.packed import Packed
 from .contact_steps import ContactSteps
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 QUANTUM = 2.0**-30

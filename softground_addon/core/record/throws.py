@@ -14,13 +14,12 @@ from enum import IntEnum
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.packed import Packed
 from .edits import StepEdit
 from .footprints import Footprint
 
-Array = NDArray[np.float64]
 _Part = TypeVar("_Part")
 
 WEIGHT, AIM, FOLLOWED = 0, slice(1, 4), 4

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
+
 Whole = NDArray[np.int64] | NDArray[np.uint32]
 Lattice = NDArray[np.uint32]
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import smooth_step
 from ..record.footprints import Footprint
 from .amounts import Amounts, Chunks
@@ -17,8 +17,6 @@ from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
 from .scattered_crumbs import ScatteredCrumbs, scattered
 from .tread import GROOVE, LENGTH, SoleTread, Under
-
-Array = NDArray[np.float64]
 
 SHALLOW = 0.5
 """Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""

@@ -10,13 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DEEP = 0.15
 """Sinkage at which feet are held and arms are out as far as they go, in leg lengths (14 cm for an adult)."""

@@ -16,6 +16,7 @@ from ..legs.wading import DEPTH_TIME, body_depth
 from ..loads.contacts import Contacts, detect_contacts
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
@@ -24,9 +25,6 @@ from ..record.ground_history import GroundHistory
 from .moved_steps import Followed
 from .performance import BENT, Performance, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 HEADING_TIME = 0.25
 """Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from math import ceil, pi, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 SUBSTEP_RATE = 480.0
 """Lowest rate of the integration [Hz]: a multiple of 24, 30, 60 and 120."""

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import CENTRE, Array, CharacterMotion
+from ..motion.motion import CENTRE, CharacterMotion
+from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import unit
 from ..numerics.slices import Slices, sliced
 from ..skin.rigid_parts import moves_as_one, rigid_motions, rigid_parts
@@ -17,7 +18,7 @@ from .bones import RestBone, RigBones
 from .mapping import RigMapping, SoleSource
 from .motion_assembly import assemble_motion
 from .recording import Recording, SceneUnits
-from .rig_skin import Indices, RigSkin
+from .rig_skin import RigSkin
 from .skin_mass import centre_of_volume
 from .skin_stances import LONGEST, skin_stances
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 
 
 @dataclass(frozen=True)

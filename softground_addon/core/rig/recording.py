@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 
 _STILL = 1e-4
 """Poses that differ by less are one, over their largest entry."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.rigid import rotation, turn_between, unit
 from ..soles.foot_attitude import UP
 from .bones import RigBones

@@ -6,7 +6,7 @@ from math import floor, log10
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..skin.volume import body_volume, welded
 from .bones import RigBones

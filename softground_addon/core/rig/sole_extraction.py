@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..soles.foot_attitude import FlatFoot, FootSize
 from ..soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
 from .bones import RigBones, family

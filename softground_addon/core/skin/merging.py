@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .skin_motion import Indices, Mask, PartTracks, SkinMotion
+from ..numerics.arrays import Indices, Mask
+from .skin_motion import PartTracks, SkinMotion
 
 HOPS = 2
 """Parts of one contact are at most so far apart in the graph of parts."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.components import components
 from ..numerics.rigid import displacement, nearest_rotation
 from ..numerics.slices import Slices, sliced
-from .skin_motion import Array, Indices
 from .volume import welded
 
 FIT = 0.005

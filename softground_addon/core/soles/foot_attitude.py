@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
 from .soles import ANKLE_HEIGHT, ANKLE_POSITION, BALL_POSITION, FOOT_TO_LEG
 
