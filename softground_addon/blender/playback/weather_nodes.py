@@ -279,10 +279,10 @@ class _Vertices:
     def _levels(self, table: Number) -> Number:
         """Height of the water in each of the hollows over its bottom [m], far below it in a dry one."""
         graph, course = self._graph, self._course
-        capacity, left, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
+        capacity, remaining, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
         rise = graph.attribute("rise", "FLOAT_VECTOR")
         low, high, seeped = course.hollows(filled.socket)
-        excess = low + (high - low) * course.between(left)
+        excess = low + (high - low) * course.between(remaining)
         share = (excess / capacity).within_one()
         root = share.root()
         powers = graph.combined(*(power.socket for power in (root, share, share * root)))

@@ -51,7 +51,7 @@ SLIDING = 0.25
 
 @sliced
 def with_edits(
-    left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float
+    record: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float
 ) -> Slices[BakeRecord]:
     """A record with other edits in place of those that it has.
 
@@ -67,7 +67,7 @@ def with_edits(
     InputError
         See `EditedSteps.pressed_again`.
     """
-    return (yield from EditedSteps.left_with.slices(EditedSteps(left.footprints, ground, cell_size), left, edits))
+    return (yield from EditedSteps.left_with.slices(EditedSteps(record.footprints, ground, cell_size), record, edits))
 
 
 class EditedSteps:
@@ -103,10 +103,10 @@ class EditedSteps:
         self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
 
     @sliced
-    def left_with(self, left: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
+    def left_with(self, record: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
         """The record that the footprints are of, with other edits; errors as `pressed_again`."""
-        again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(left.footprints, edits))
-        return replace(left, edits=dict(edits), pressed_again=again)
+        again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(record.footprints, edits))
+        return replace(record, edits=dict(edits), pressed_again=again)
 
     @sliced
     def pressed_again(self, edits: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:

@@ -112,20 +112,20 @@ def responses_of(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    left: BakeRecord,
+    record: BakeRecord,
     options: ResponseOptions | None,
 ) -> Slices[list[CharacterResponse]]:
     """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps."""
     responses: list[CharacterResponse] = []
     if options is None:
         return responses
-    history = GroundHistory(terrain, left.edited)
+    history = GroundHistory(terrain, record.edited)
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
-        followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
-        standing = leaving_early(motion, touching, left.edited) if options.grounding else touching
+        followed = follow(motion, touching, record.footprints, record.edits) if options.grounding else Followed()
+        standing = leaving_early(motion, touching, record.edited) if options.grounding else touching
         yield
         response = yield from respond.slices(
             motion,
@@ -140,7 +140,7 @@ def responses_of(
         before = yield from gaps.slices(motion, standing, history)
         yield
         after = yield from gaps.slices(responding(motion, response), standing, history)
-        sinkage = mean_sinkage(left.edited, motion.name)
+        sinkage = mean_sinkage(record.edited, motion.name)
         responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses
 

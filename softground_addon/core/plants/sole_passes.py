@@ -141,10 +141,10 @@ def _movement(step: Footprint, place: Array, start: Array, end: Array) -> _Movem
     for number in range(poses.shape[1]):
         height[:, patch == number] = poses[:, number, 2] @ local[patch == number].T
     is_low = height <= height[before:].min(axis=0) + LIFTED
-    left = last - is_low[::-1].argmax(axis=0)
-    later, at = np.minimum(left + MOVEMENT_STEPS, last), np.minimum(left, np.maximum(last - 1, 0))
+    leaves = last - is_low[::-1].argmax(axis=0)
+    later, at = np.minimum(leaves + MOVEMENT_STEPS, last), np.minimum(leaves, np.maximum(last - 1, 0))
     rise = (height[later, each] - height[at, each]) / np.maximum(later - at, 1)
-    stays = np.maximum(end, frames[np.maximum(left - before, 0)])
+    stays = np.maximum(end, frames[np.maximum(leaves - before, 0)])
     return _Movement(along, down / step.load_spacing, np.maximum(rise, slowest) / step.load_spacing, stays)
 
 
