@@ -24,7 +24,7 @@ def edited_contact(
 
     Parameters
     ----------
-    own : PressingSole
+    sole : PressingSole
         That made the step.
     steps : Steps
         What it did.
@@ -48,7 +48,7 @@ def swapped(steps: Steps, sole: PressingSole, other: PressingSole) -> Steps:
     Parameters
     ----------
     steps : Steps
-        What `own` did.
+        What `sole` did.
     """
     if other is sole:
         return steps

@@ -183,8 +183,8 @@ def throw(
 
     Parameters
     ----------
-    found : sequence of Source
-        From `sources`.
+    sources : sequence of Source
+        Result of the function of that name.
     gravity : float
         [m/s²]
     height : callable
