@@ -44,7 +44,7 @@ def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> No
 
 @dataclass(frozen=True)
 class Coverage:
-    """How densely the ground's vertices lie under the prints.
+    """Density of the ground's vertices under the prints.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Coverage:
 
 @sliced
 def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: float) -> Slices[Coverage]:
-    """How densely vertices (V, 3), of which those in `index` are moved, lie where the ground is, or will be, printed.
+    """Density of vertices (V, 3), of which those in `index` are moved, where the ground is, or will be, printed.
 
     `printed` are the `cell_keys` of those cells, ascending, `cell_size` is in [m].
     """

@@ -1,4 +1,4 @@
-"""Whom a user means: from what is selected, or from all of a scene, to the rigs and objects that print."""
+"""Rigs and objects that print, from what a user has selected, or from all of a scene."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ Names = tuple[str, ...]
 
 
 def names_of(ground: bpy.types.Object, painted: Sequence[str]) -> Names:
-    """Which of the names that were chosen, in the order of `CHANNELS`, the mesh of a ground is painted with.
+    """The chosen names, in the order of `CHANNELS`, that the mesh of a ground is painted with.
 
     Raises
     ------

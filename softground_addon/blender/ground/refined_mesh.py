@@ -227,7 +227,7 @@ def _edge_keys(edges: Indices, size: int) -> Indices:
 
 
 def _copy_choices(mesh: bpy.types.Mesh, carried: Carried) -> None:
-    """Which UV map and colours are active and rendered."""
+    """Make the same UV map and colours active and rendered."""
     for name, active, active_render in carried.uv_maps:
         copy: Any = mesh.uv_layers.get(name)
         if copy is not None:

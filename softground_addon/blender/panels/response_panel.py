@@ -214,7 +214,7 @@ def _group(layout: Any, group: Any, fields: tuple[str, ...]) -> Any:
 
 
 def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
-    """Which bone carries the body, and the frames where a gap is left."""
+    """The bone that carries the body, and the frames where a gap remains."""
     box = layout.box().column(align=True)
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")

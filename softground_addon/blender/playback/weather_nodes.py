@@ -338,7 +338,7 @@ class _Vertices:
 
 
 def _shares(graph: NodeGraph, variance: Number) -> Any:
-    """How far a variance is through each of the spans between `BOUNDS`, 0 to 1."""
+    """Part of each span between `BOUNDS` that a variance is through, 0 to 1."""
     spans = [high - low for low, high in pairwise(BOUNDS)]
     factors = tuple(1.0 / span for span in spans)
     offsets = tuple(-low / span for low, span in zip(BOUNDS[:-1], spans, strict=True))

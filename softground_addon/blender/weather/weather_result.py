@@ -29,7 +29,7 @@ def modifier_of(ground: bpy.types.Object | None) -> Any:
 
 
 def hours(scene: bpy.types.Scene) -> float:
-    """How long the scene lasts in the time of its weather, whose scale is not keyed [h]."""
+    """Length of the scene in the time of its weather, whose scale is not keyed [h]."""
     modifier = modifier_of(scene.softground.ground)
     if not modifier:
         return 0.0

@@ -39,7 +39,7 @@ REACH = 0.04
 
 @dataclass(frozen=True)
 class Walls:
-    """How ground stands that was cut.
+    """Walls of ground that was cut.
 
     Attributes
     ----------

@@ -129,12 +129,12 @@ class _Touching:
 
     @property
     def rests(self) -> Mask:
-        """When some skin touches and is calm however fast the body is, (F,)."""
+        """True while some skin touches and is calm however fast the body is, (F,)."""
         return np.asarray((self.on & (self.skin.rise < CALM_SPEED * self.skin.height)).any(axis=1))
 
 
 def _resting(height: Array, skin: LowSkin) -> float | None:
-    """How far over the ground the skin rests [m], by the low envelope or where calm skin is lowest most often."""
+    """Height over the ground of resting skin [m], by the low envelope or where calm skin is lowest most often."""
     lowest = height.min(axis=1)
     lowest = lowest[np.isfinite(lowest)]
     if not len(lowest):

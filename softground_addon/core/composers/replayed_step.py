@@ -107,7 +107,7 @@ class ReplayedStep:
             weathered.press(window, after - before)
 
     def _known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
-        """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""
+        """Frame by which each cell of its window changed last, and the cells in contact, as `WeatheredCells.note`."""
         footprint, window = self._footprint, self._footprint.window
         last, touched = np.full(window.cells, -np.inf), np.zeros(window.cells, bool)
         for frames, first, cells, _ in self._changes:

@@ -1,4 +1,4 @@
-"""How the characters of a shot respond to the ground that they press, and what is said of it."""
+"""Responses of the characters of a shot to the ground that they press, and what is said of them."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def gap_table(
 
 
 def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
-    """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
+    """Height of feet above their prints, apart from a few frames [mm], of a report's gaps."""
     remaining = gaps_mm.get("after", gaps_mm["before"])
     return max((of_character["float"]["p95"] for of_character in remaining.values()), default=0.0)
 

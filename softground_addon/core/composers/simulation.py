@@ -188,7 +188,7 @@ class ShotContact:
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
     def layout(self, frames: Array, stride: int = 1) -> ContactLayout:
-        """How it is laid out, at steps of the time grid that are at these scene frames; at each of so many only."""
+        """Its layout, at steps of the time grid that are at these scene frames; at each of so many only."""
         motion, contacts, forces = self.character.motion, self.character.contacts, self.character.forces
         index, during = self.of[1], slice(self.during.start, self.during.stop, stride)
         sole, poses = motion.soles[index].sole, motion.soles[index].transforms
@@ -265,7 +265,7 @@ def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
 def _state_at(
     loads: Sequence[CharacterLoads], offsets: Sequence[int], step: int
 ) -> tuple[tuple[NDArray[np.bool_], ...], tuple[Array, ...]]:
-    """Which soles touch, and the force on each, at a step of the common grid; nothing outside a character's time."""
+    """Soles that touch, and the force on each, at a step of the common grid; nothing outside a character's time."""
     touching, forces = [], []
     for character, offset in zip(loads, offsets, strict=True):
         index = step - offset

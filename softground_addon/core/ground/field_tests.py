@@ -77,7 +77,7 @@ def with_boot_depth(material: GroundMaterial, depth: float) -> GroundMaterial:
 
 
 def boot_depth(material: GroundMaterial) -> float:
-    """How deep a standing boot sinks [m]."""
+    """Sinkage of a standing boot [m]."""
     load = BOOT_STRESS / (material.youngs_modulus * material.firmness(BOOT_WIDTH))
     return float(strain(load, material)) * material.layer_depth
 

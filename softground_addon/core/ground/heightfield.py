@@ -116,7 +116,7 @@ class Surface:
         return level, level + rise * self.cell_size
 
     def beyond(self, x: Array, y: Array) -> Mask:
-        """Which world positions [m] lie beyond the edge of the ground."""
+        """True for world positions [m] beyond the edge of the ground."""
         off: Mask = np.isnan(self.heights[self.window.cells_under(x, y, self.cell_size)])
         return off
 

@@ -47,6 +47,6 @@ class Places:
 
 
 def inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
-    """Which places lie in the cells of a window."""
+    """True for places in the cells of a window."""
     column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
     return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)

@@ -1,4 +1,4 @@
-"""How the ground varies from place to place: factors on stiffness, layer depth and rim, as painted on its surface."""
+"""Variation of the ground from place to place: factors on stiffness, layer depth and rim, as painted on its surface."""
 
 from __future__ import annotations
 

@@ -311,7 +311,7 @@ def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
 
 
 def _swing_lowered(spare: Array, touching: Mask, time: float) -> Array:
-    """How far a foot that ploughs swings lower (F,) [m]: by what is to spare, 0 at contacts."""
+    """Amount by which a foot that ploughs swings lower (F,) [m]: what is to spare, 0 at contacts."""
     distance = _frames_from_contact(touching) - 0.5  # between the frames
     return np.where(np.isfinite(spare), np.maximum(spare, 0.0), 0.0) * smooth_step(distance / time)
 

@@ -1,4 +1,4 @@
-"""Whether a shot can be baked: in memory, in the time that is allowed, with cells that show a foot."""
+"""Limits of what can be baked: in memory, in the time that is allowed, with cells that show a foot."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ USABLE = 0.8
 
 @dataclass(frozen=True)
 class Fineness:
-    """How finely a ground is pressed and shown.
+    """Fineness with which a ground is pressed and shown.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ def check_frames(
 
 
 def _too_much(needed: float, time: float, longest: float, available: float | None, set_by: str = "") -> str:
-    """Which limit memory [bytes] or time [s] are beyond; empty where neither is."""
+    """Limit that memory [bytes] or time [s] are beyond; empty where neither is."""
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:

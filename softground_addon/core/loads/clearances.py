@@ -1,4 +1,4 @@
-"""How far points are from the ground, along its normal."""
+"""Distances of points from the ground, along its normal."""
 
 from __future__ import annotations
 

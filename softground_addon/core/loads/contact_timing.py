@@ -137,7 +137,7 @@ def _rolled_on(touching: NDArray[np.bool_], lifted: NDArray[np.bool_], longest: 
 
 
 def _resting(motion: CharacterMotion) -> NDArray[np.bool_]:
-    """When the skin of each sole rests, (N, S); never where that is not seen."""
+    """True while the skin of each sole rests, (N, S); never where that is not seen."""
     never = np.zeros(len(motion.frames), dtype=bool)
     return np.stack([never if sole.bears is None else sole.bears for sole in motion.soles], axis=1)
 

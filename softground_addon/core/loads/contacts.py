@@ -1,4 +1,4 @@
-"""When each sole touches its ground.
+"""Contacts of each sole with its ground.
 
 Detection is scale-free: heights are compared as fractions of the leg length and speeds as fractions of
 sqrt(gravity·leg length), so that the same numbers serve a mouse and a giant, metres and centimetres
@@ -81,7 +81,7 @@ SLOPE_PROBE = 0.02
 
 @dataclass(frozen=True)
 class Contacts:
-    """Which soles touch at each step.
+    """Soles that touch at each step.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Contacts:
 
     @property
     def standing(self) -> Mask:
-        """Which soles touch the ground or something hard, (N, S)."""
+        """True for soles that touch the ground or something hard, (N, S)."""
         return self.touching if self.hard is None else self.touching | self.hard
 
     def during(self, steps: slice) -> Contacts:
@@ -296,7 +296,7 @@ def _low(clearance: Array, leg_length: float) -> float:
 def _detect(
     track: _Track, drift: Array, body_speed: Array, motion: CharacterMotion, float_limit: float
 ) -> tuple[Mask, float]:
-    """When one sole touches, and the float that was removed."""
+    """Steps at which a sole touches, and the float that was removed."""
     leg = motion.leg_length
     speed = np.linalg.norm(track.velocity - drift, axis=-1)
     offset = _float(track.clearance, speed / motion.froude_speed, float_limit * leg)

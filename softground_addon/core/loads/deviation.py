@@ -1,4 +1,4 @@
-"""How far estimated forces may be off: a standard deviation for each sole at each step.
+"""Error of estimated forces: a standard deviation for each sole at each step.
 
 Four causes decide it, each tried or worked out by itself and added in squares: the choice of the low-pass, the times at
 which contacts begin and end, the noise of the motion, and the share of soles that bear together.

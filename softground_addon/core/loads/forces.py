@@ -142,7 +142,7 @@ def _with_idle(share: Array, touching: NDArray[np.bool_]) -> Array:
 
 
 def _along_legs(motion: CharacterMotion, centre: Array, share: Array, pressure: Array) -> Array:
-    """How much more each force leans than their sum does, (N, S, 2): legs push along themselves.
+    """Lean of each force beyond that of their sum, (N, S, 2): legs push along themselves.
 
     Feet that bear together push against each other so that their forces meet above the body's centre (Maus et al. 2010,
     "Upright human gait did not provide a major mechanical challenge for our ancestors", Nature Communications 1,

@@ -1,4 +1,4 @@
-"""When a prop without a skeleton touches the ground and what the ground does to it, from its mass and its motion.
+"""Contacts of a prop without a skeleton and what the ground does to it, from its mass and its motion.
 
 A body in the air feels nothing. On the ground it feels its weight, and what changes its momentum: m·(g + a). What stops
 a fall stops it within the ground's characteristic time, as in the paper (Eq. 8): animation and simulation stop it from
@@ -158,7 +158,7 @@ def _pushed(
 
 @dataclass(frozen=True)
 class _Approach:
-    """How a prop lies to its ground at each of F frames.
+    """Place of a prop over its ground at each of F frames.
 
     Attributes
     ----------

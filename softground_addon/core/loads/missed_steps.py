@@ -71,7 +71,7 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
 
 
 def rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) -> Mask:
-    """When some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
+    """True while some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
     points = sole.landmark_positions()
     if len(points) < 2:
         return np.zeros(len(points), dtype=bool)

@@ -185,7 +185,7 @@ class CharacterMotion:
 
     @property
     def time_scale(self) -> float:
-        """How much slower than an adult's a motion of the same kind is."""
+        """Ratio of its times to those of an adult's motion of the same kind."""
         return float(np.sqrt(self.leg_length / ADULT_LEG))
 
     @property

@@ -31,7 +31,7 @@ def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
 
 
 def across(of_kinds: Sequence[Imprints], shares: Array) -> tuple[Imprints, int]:
-    """Which cells are compressed how much where each kind of ground has a share in them.
+    """Compression of cells where each kind of ground has a share in them.
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ def with_toes(sources: Sequence[SoleSource], recording: Recording) -> tuple[Sole
     """Contacts of several parts as feet whose foremost part are the toes; limbs stay as they are."""
 
     def ahead(part: str, source: SoleSource) -> float:
-        """How far a part is before the main one along its front."""
+        """Distance of a part before the main one, along its front."""
         main, other = recording.bone(source.bone), recording.bone(part)
         return float(np.median(((other[:, :3, 3] - main[:, :3, 3]) * main[:, :3, 1]).sum(axis=1)))
 
