@@ -15,7 +15,6 @@ from functools import partial
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings
@@ -48,8 +47,6 @@ from .bake_checks import check_motion, copy_findings, coverage, coverage_finding
 from .publish import Published, at_the_end, publish, sign
 from .scene_findings import scene_findings
 from .shot_prints import shot_prints
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 FRAMES_AT_ONCE = 16
