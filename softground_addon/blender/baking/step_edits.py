@@ -127,7 +127,6 @@ def _made_with(now: BakeSettings, left: record.BakeRecord) -> BakeSettings:
     try:
         inputs = left.about["inputs"]
         on_ground = {name: type(value)(inputs[name]) for name, value in now.between(Acts.WRITING, Acts.WRITING).items()}
-        units = baked_ground.units_of(inputs)
         surfaces.find(inputs["surface"])
         if inputs["pressure"] not in get_args(Pressure):
             raise ValueError("there is no such pressure")
@@ -140,11 +139,8 @@ def _made_with(now: BakeSettings, left: record.BakeRecord) -> BakeSettings:
             pressure=inputs["pressure"],
             painted=(stiffness, layer_depth, rim),
             frames=baked_ground.frames_of(inputs),
-            cell_size_m=units["cell_size_m"],
-            frame_rate=units["frame_rate"],
-            time_stretch=units["time_stretch"],
-            gravity_m_s2=units["gravity_m_s2"],
-            unit_scale_m=units["unit_scale_m"],
+            cell_size_m=baked_ground.unit_of(inputs, "cell_size_m"),
+            **vars(baked_ground.units_of(inputs)),
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
             regions=tuple(map(_region, inputs.get("regions", ()))),
