@@ -88,7 +88,8 @@ def export_images(
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     reach = STRAY + 4 * (float(np.hypot(sigma, weathered_points.BLUR)) if weathered else sigma)
-    fallen = _fallen(ground, units)
+    thrown = debris_object.of(ground)
+    fallen = debris_object.at_rest(thrown, units) if thrown is not None else None
     if fallen is not None:
         reach = max(reach, _farthest(footprints, fallen.place))
     pixels = _pixels(ground, units.unit_scale_m, footprints, reach, resolution, uv_map)
@@ -138,16 +139,6 @@ def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:
     weathered = weathered_points.has_weather(baked_ground.display_mesh_of(ground))
     thrown = debris_object.of(ground) is not None
     return (DISPLACEMENT, MASK, *((WEATHER,) if weathered else ()), *((DEBRIS,) if thrown else ()))
-
-
-def _fallen(ground: bpy.types.Object, units: SceneUnits) -> debris_object.AtRest | None:
-    """Debris at rest; None if steps threw nothing."""
-    obj = debris_object.of(ground)
-    if obj is None:
-        return None
-    return debris_object.at_rest(
-        obj, frame_rate=units.frame_rate, time_stretch=units.time_stretch, unit_scale=units.unit_scale_m
-    )
 
 
 def _farthest(footprints: Sequence[Footprint], place: Array) -> float:

@@ -584,7 +584,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
             shown = (thickness.sum(axis=0) @ centre, thickness.sum(axis=1) @ centre) / thickness.sum()
             assert shown == pytest.approx(lies, abs=0.02)
     set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
-    blown = debris_object.at_rest(obj, frame_rate=24.0, time_stretch=1.0, unit_scale=1.0).place
+    blown = debris_object.at_rest(obj, settings.units_of(scene)).place
     there = wanted(obj, 1e4, (3, 0, 0))
     beside = (there[:, 2] < -5).sum()  # what fell beside the ground lies nowhere, and grains fall slowly
     assert len(there) - len(blown) == beside < 0.002 * len(there)
