@@ -7,21 +7,18 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks.self_check import no_motion
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings
 from .. import settings
 from ..ground import ground_surface
 from ..rigs.frame_ranges import holds_a_pose
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 COARSEST_SPACING = 0.25
 """Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""

@@ -65,14 +65,10 @@ def put(
 
     Parameters
     ----------
-    ground : bpy.types.Object
-    debris : Debris or None
-    surface : str
-    units : SceneUnits
     of_steps : mapping of int to str
         Surfaces of steps, by their numbers, on a ground with regions.
     """
-    older = BELONGS.kept(ground, wanted=debris is not None and bool(len(debris.birth)))
+    older = BELONGS.remaining(ground, wanted=debris is not None and bool(len(debris.birth)))
     _remove_unused()
     if debris is None or not len(debris.birth):
         return None

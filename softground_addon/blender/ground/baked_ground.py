@@ -154,7 +154,6 @@ def write(
 
     Parameters
     ----------
-    place : Place
     sample : GroundSample
         The finished ground at the place's positions.
     spans : Spans

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.variation import CHANNELS
+from ...core.numerics.arrays import Array
 from ..properties import SoftGroundPainted
-
-Array = NDArray[np.float64]
 
 _SETTINGS = dict(zip(CHANNELS, ("stiffness", "layer_depth", "rim"), strict=True))
 """The setting that names what each channel is painted with."""
@@ -63,7 +61,6 @@ def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Arr
         Whose vertex groups they are.
     mesh : bpy.types.Mesh
         Its own mesh, or the evaluated one.
-    names : Names
 
     Returns
     -------

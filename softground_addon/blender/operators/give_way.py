@@ -75,7 +75,7 @@ def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
     if obj.type not in give_way.SCATTERS:
         return False
     is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
-    return not is_ground or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj))
+    return not is_ground or any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
 
 
 class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):

@@ -47,13 +47,19 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         return bool(
-            character and character.armature and character.mass > 0 and stature_of(scene, character.armature) > 0
+            character
+            and character.armature
+            and character.mass > 0
+            and stature_of(scene.unit_settings.scale_length, character.armature) > 0
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
-        body = {"mass": character.mass, "arm": CENTRE_HEIGHT * stature_of(scene, character.armature)}
+        body = {
+            "mass": character.mass,
+            "arm": CENTRE_HEIGHT * stature_of(scene.unit_settings.scale_length, character.armature),
+        }
         gains = {
             "DEFAULT": TiltGains(),
             "AUTHORS": body_gains(*AUTHORS_TORQUES, **body),

@@ -92,11 +92,8 @@ class CourseNodes:
 
     Parameters
     ----------
-    graph : NodeGraph
     said : mapping
         The group's inputs by name.
-    matter : Matter
-    span : Span
     soaking : (float, float)
         Least and largest share of its soaking that a hollow has left.
     table : bpy.types.Object

@@ -162,9 +162,6 @@ class _Vertices:
 
     Parameters
     ----------
-    graph : NodeGraph
-    course : CourseNodes
-    matter : Matter
     up : (3,) floats
         See `build`.
     again, has_water : bool
@@ -224,14 +221,14 @@ class _Vertices:
             filled = self._number(self._course.aged["filled"], self._moment)
             change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
             pressed, risen = (graph.number(graph.attribute(name)) for name in (COMPRESSION, RIM))
-            left = filled + 1.0
-            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * left, risen * left, rounded), strict=True))
+            remaining = filled + 1.0
+            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * remaining, risen * remaining, rounded), strict=True))
             worn[BLOWN] = (pressed * filled * (-1.0 / COVERED)).within_one()
         height = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
-            left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
-            height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
+            remaining = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
+            height = height - self._thawed((remaining + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
         fresh = (cover * (1.0 / COVERED)).within_one()
         floods = acts["Rain"] + acts["Water Table"]
         standing = [self._standing(table, relief + height).where(floods)] if matter.soaking else []

@@ -55,7 +55,6 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
 
     Parameters
     ----------
-    ground : bpy.types.Object
     left : BakeRecord, optional
         What its bake left, where that need not be read.
     preset : str, optional
@@ -226,9 +225,11 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
     """
     pressed, since, compacted = places.times.T
-    capacity, above, left = places.pool.T
+    capacity, above, remaining = places.pool.T
     rise, filled = places.levels[:, :POWERS], 1 + moment_of(places.levels[:, POWERS], span)
-    each, of_wet = np.unique(np.column_stack([capacity, left, filled, rise])[capacity > 0], axis=0, return_inverse=True)
+    each, of_wet = np.unique(
+        np.column_stack([capacity, remaining, filled, rise])[capacity > 0], axis=0, return_inverse=True
+    )
     hollow = np.zeros(len(capacity), dtype=np.intp)
     hollow[capacity > 0] = 1 + of_wet.ravel()
     values: dict[str, NDArray[Any]] = {

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..findings import Finding
 from ..ground.hard_ground import bare, up_to
@@ -15,13 +14,11 @@ from ..loads.contacts import LEAVE_HEIGHT
 from ..loads.estimate import CharacterLoads
 from ..loads.missing_ground import beyond_edge
 from ..motion.motion import CharacterMotion, LowSkin
+from ..numerics.arrays import Array, Mask
 from ..numerics.slices import Slices
 from ..record.footprints import Footprint
 from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 OFF_SKIN = 0.012
 """The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""

@@ -12,7 +12,6 @@ from functools import reduce
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.heightfield import HeightField
@@ -34,7 +33,6 @@ from ..record.record import BakeRecord
 from .edited_contacts import edited_contact
 from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
 
-Array = NDArray[np.float64]
 Change = tuple[int, StepEdit]
 """Number of a step, and what was changed of it."""
 
@@ -59,8 +57,6 @@ def with_edits(
 
     Parameters
     ----------
-    left : BakeRecord
-    edits : mapping of step id to StepEdit
     ground : SoftGround
         That it was baked on.
     cell_size : float

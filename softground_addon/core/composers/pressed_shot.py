@@ -33,12 +33,10 @@ class PressedShot:
 
     Attributes
     ----------
-    loads : list of CharacterLoads
     left : BakeRecord
         Its steps, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
-    responses : list of CharacterResponse
     """
 
     loads: list[CharacterLoads]
@@ -61,10 +59,6 @@ def press_shot(
 
     Parameters
     ----------
-    wanted : BakeSettings
-    motions : sequence of CharacterMotion
-    ground : SoftGround
-    edits : mapping of step id to StepEdit
     factors : (V, 3) float array, optional
         What is painted on the ground.
 

@@ -40,8 +40,6 @@ class CharacterResponse:
     ----------
     motion : CharacterMotion
         The source, at scene frames.
-    response : Response
-    before, after : Gaps
     sinkage : float
         Mean depth of the character's prints [m].
     out_of_reach : tuple of OutOfReach
@@ -168,15 +166,15 @@ def gap_table(
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         yield
-        left = yield from gaps.slices(motion, touching, history)
-        table[motion.name] = _statistics(left)
+        remaining = yield from gaps.slices(motion, touching, history)
+        table[motion.name] = _statistics(remaining)
     return {"before": table, "after": table}
 
 
 def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
     """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
-    left = gaps_mm.get("after", gaps_mm["before"])
-    return max((of_character["float"]["p95"] for of_character in left.values()), default=0.0)
+    remaining = gaps_mm.get("after", gaps_mm["before"])
+    return max((of_character["float"]["p95"] for of_character in remaining.values()), default=0.0)
 
 
 def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from ..ground import crumbs, surfaces
 from ..ground.surfaces import ThrownMatter
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from ..record.throws import AIM, WEIGHT, Throw, ThrowKind
 from . import flight
 
-Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
 
 GRAINS = (0.2e-3, 0.6e-3)
@@ -130,10 +130,8 @@ def sources(
 
     Parameters
     ----------
-    thrown : sequence of Throw
     steps : sequence of EditableStep
         With all of their rims.
-    surface : str
     gravity : float
         [m/s²]
     """
@@ -187,7 +185,6 @@ def throw(
     ----------
     found : sequence of Source
         From `sources`.
-    surface : str
     gravity : float
         [m/s²]
     height : callable

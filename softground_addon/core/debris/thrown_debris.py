@@ -6,20 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.soft_ground import SoftGround, Weathering
 from ..ground.sparse_grid import SparseGrid
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..record.footprints import recompose
 from ..record.record import BakeRecord
 from . import flight
 from .debris import Debris, Height, sources, throw, volumes
 from .step_throws import throws_of
-
-Array = NDArray[np.float64]
 
 
 @sliced
@@ -36,10 +34,8 @@ def thrown(
 
     Parameters
     ----------
-    left : BakeRecord
     ground : SoftGround
         Before anything pressed it.
-    surface : str
     cell_size : float
         [m]
     gravity : float

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from .sparse_grid import Window
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class Places:

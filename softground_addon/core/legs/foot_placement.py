@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
 from .wading import depth_of_contacts, dragged, ploughed
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ANKLE_PITCH = np.radians(25.0)
 """Largest pitch that a foot takes on beside that of the source [rad]: feet bend up by 20-30° (dorsiflexion)."""

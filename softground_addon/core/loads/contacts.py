@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
@@ -26,9 +27,6 @@ from .clearances import clearances
 
 if TYPE_CHECKING:
     from ..ground.heightfield import Terrain
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOUCH_HEIGHT = 0.025
 """A sole lower than this starts to touch, in leg lengths (2 cm for an adult)."""
@@ -183,9 +181,9 @@ def _shown(touching: Mask, seen: Contacts) -> Mask:
     shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
     for sole in np.flatnonzero(seen.touching.any(axis=0)):
         for first, last in zip(*runs(seen.touching[:, sole]), strict=True):
-            told = np.flatnonzero(shown[first:last, sole])
-            if len(told):  # it does not leave and land again while its skin bears on
-                shown[first + told[0] : first + told[-1], sole] = True
+            seen_at = np.flatnonzero(shown[first:last, sole])
+            if len(seen_at):  # it does not leave and land again while its skin bears on
+                shown[first + seen_at[0] : first + seen_at[-1], sole] = True
             if shown[first:last, sole].mean() < SURE:
                 shown[first:last, sole] = True
         bears, clearance = seen.touching[:, sole], seen.clearance[:, sole]
@@ -283,7 +281,6 @@ def slowest_belt(velocities: Sequence[Array], motion: CharacterMotion) -> float:
     ----------
     velocities : sequence of (N, 2 or 3) float array
         Of each sole [m/s].
-    motion : CharacterMotion
     """
     fastest = max(float(np.percentile(np.linalg.norm(velocity[:, :2], axis=1), 95)) for velocity in velocities)
     unit = motion.froude_speed

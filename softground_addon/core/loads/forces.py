@@ -17,10 +17,9 @@ from ..dynamics.centre_of_mass import centre_of_mass
 from ..dynamics.centre_of_pressure import centres_of_pressure, lowest_points
 from ..dynamics.load_sharing import point_of_action, share_by_moment, whole_body_shares
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from .contacts import Contacts
-
-Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
 
