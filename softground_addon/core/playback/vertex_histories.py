@@ -28,8 +28,8 @@ Indices = NDArray[np.intp]
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
 
-ROOM = 50_000
-"""Cells of the footprints near places up to which their changes are not packed: some megabytes."""
+ROOM = 500_000
+"""Changes of the footprints near places up to which they are not packed: six megabytes."""
 
 _NO_RAMPS = Ramps.joined([], 2)
 
@@ -119,7 +119,8 @@ def vertex_histories(
     near = _near(footprints, places, kernels)
     for number in in_blocks.keys() - set(near):
         del in_blocks[number]
-    is_small = sum(footprints[number].window.cells for number in near) < ROOM
+    of_near = [changes for number in near for changes in (footprints[number].compression, footprints[number].rim)]
+    is_small = sum(int(changes.first[-1]) for changes in of_near) < ROOM
     for number in near:
         in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_small=is_small))
     footprints = [footprints[number] for number in near]
