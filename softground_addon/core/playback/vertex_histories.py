@@ -142,9 +142,16 @@ def vertex_histories(
             shared = np.zeros(len(points))
             for other in together:
                 shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
-            fitted = fit(frames, moved, allowed / shared[:, None])
+            margin, off = allowed / shared[:, None], np.zeros(len(points))
+            if is_carved[number]:  # half of the tolerance for its ends
+                margin = margin / 2
+                shortened = _without_small_ends(moved, margin)
+                off = np.abs(shortened - moved)[..., 0].max(axis=0)
+                fitted = fit(frames, shortened, margin)
+            else:
+                fitted = fit(frames, moved, margin)
             of_step.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
-            error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
+            error = max(error, float(((fitted.error[:, 0] + off) * shared).max(initial=0.0)))
             yield
         if len(its_relief.point):
             span = spans[number, 0], spans[number, 1]
@@ -157,6 +164,15 @@ def vertex_histories(
         joined(contacts),
         error,
     )
+
+
+def _without_small_ends(moved: Array, margin: Array) -> Array:
+    """Movements (T, K, C) that begin and end where they are off their first and last values by more than a margin."""
+    begun = np.logical_or.accumulate((np.abs(moved) > margin).any(axis=-1), axis=0)
+    ends = np.logical_or.accumulate((np.abs(moved - moved[-1]) > margin).any(axis=-1)[::-1], axis=0)[::-1]
+    shortened: Array = np.where(ends[..., None], np.where(begun[..., None], moved, 0.0), moved[-1])
+    shortened[0] = 0.0
+    return shortened
 
 
 def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[float, Array]) -> list[int]:
