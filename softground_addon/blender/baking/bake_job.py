@@ -129,7 +129,7 @@ def bake(
         inputs=inputs,
         input_hash=input_hash,
         steps=left.steps,
-        carves=left.carves,
+        carves=left.laid_carves,
         edits=left.edits,
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),

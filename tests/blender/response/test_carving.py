@@ -180,6 +180,44 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
 
 
+def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
+    walker(scene, **DEEP)
+    scene.softground.ground_margin = 2.0
+    _, left = bake(scene)
+    number, beside = min(left.carves), (0.0, 1.5)
+    step, carve = left.footprints[number], left.carves[number]
+    name = step_id(step)
+
+    def edited(edits):
+        step_edits.edit(scene, step_edits.editable(scene), edits)
+        return baked_ground.record_of(scene.softground.ground)
+
+    def lying(records, away=(0.0, 0.0)):
+        """Heights around the hole, or as far away from it."""
+        window = carve.window.expanded(5)
+        x, y = np.meshgrid(*window.centres(CELL))
+        compression, rim = recompose(records).nearest(x + away[0], y + away[1])
+        return rim - compression
+
+    moved = edited({name: StepEdit(move_m=beside)})
+    there = moved.laid_carves[number]
+    assert np.abs(lying([there], beside) - lying([carve])).max() < 1e-6
+    assert there.tile(there.rim).sum() == pytest.approx(carve.tile(carve.rim).sum(), rel=1e-6)
+    copied = edited({f"{name}+1": StepEdit(move_m=beside)})
+    assert np.array_equal(lying([copied.laid_carves[number + len(left.footprints)]], beside), lying([there], beside))
+    assert copied.laid_carves[number] is copied.carves[number]
+    edited({name: StepEdit(move_m=(0.0, 0.1), shift_frames=4)})
+    report, again = bake(scene)
+    assert again.carved_with == {name: StepEdit(move_m=(0.0, 0.1))}
+    assert again.laid_carves[number].start_frame == again.carves[number].start_frame + 4
+    assert report["totals"]["carved_m3"] == pytest.approx(
+        sum(c.compressed_m3 for c in again.carves.values()), rel=1e-12
+    )
+    at_bake, back = again.carves[number], edited({}).laid_carves[number]
+    before, after = (np.array(each.window[:2]) + np.array(each.window[2:]) / 2 for each in (at_bake, back))
+    assert (after - before) * CELL == pytest.approx([0.0, -0.1], abs=CELL)
+
+
 def test_a_bake_from_before_carving_is_still_current(scene):
     walker(scene)
     bake(scene)
