@@ -134,7 +134,7 @@ def bake(
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, left.steps),
+        events=as_edited(happened, left.steps, left.laid_carves),
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
