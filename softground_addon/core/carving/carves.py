@@ -19,8 +19,10 @@ from ..ground.surfaces import find
 from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
+from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
-from ..record.record import BakeRecord
+from ..record.moved_carve import placement, shifted
+from ..record.record import BakeRecord, EditableStep
 from .carved_ground import CarvedGround
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
@@ -51,7 +53,7 @@ def with_carves(
     surface : str
         What it is made of.
     """
-    prints = {step.index: step.left for step in left.steps if step.left is not None}
+    prints = {step.index: _as_the_body_steps(step) for step in left.steps if step.left is not None}
     waders = {print.character for print in prints.values() if is_deep(print)}
     responded = [
         (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
@@ -61,7 +63,16 @@ def with_carves(
     if not responded:
         return left
     walls = Walls.of(find(surface), ground.material, ground.gravity)
-    return replace(left, carves=(yield from carves_of.slices(responded, prints, ground, walls)))
+    carves = yield from carves_of.slices(responded, prints, ground, walls, len(left.footprints))
+    where = {name: replace(placement(edit), shift_frames=0) for name, edit in left.edits.items()}
+    return replace(left, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
+
+
+def _as_the_body_steps(step: EditableStep) -> Footprint:
+    """The print of a step that is left, when its body takes the step, which follows no edit of its time."""
+    assert step.left is not None
+    at = shifted(step.left, -step.edit.shift_frames) if step.edit.shift_frames else step.left
+    return at if at.pressed_by else replace(at, pressed_by=step.baked.pressed_by)
 
 
 @sliced
@@ -70,6 +81,7 @@ def carves_of(
     footprints: Mapping[int, Footprint],
     ground: SoftGround,
     walls: Walls,
+    count: int,
 ) -> Slices[dict[int, Footprint]]:
     """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
 
@@ -79,6 +91,8 @@ def carves_of(
         Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
+    count : int
+        Of the steps that bodies take; those of higher numbers are copies.
     """
     first = next(iter(footprints.values()))
     steps = {
@@ -87,7 +101,8 @@ def carves_of(
     }
     frames = skins[0][2].frames
     carving = CarvedGround(ground, walls, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
-    bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
+    taken = [step for number, step in steps.items() if number < count]
+    bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
