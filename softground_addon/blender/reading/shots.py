@@ -227,7 +227,7 @@ def sample_characters(
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s, set_by=TIME_LIMIT)
-    motions, rigs = [], []
+    motions, rigs, units = [], [], wanted.units  # what was read is compared later, and is not all settings
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, character in enumerate(wanted.characters):
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
@@ -248,17 +248,17 @@ def sample_characters(
                 frames=frames,
                 poses=poses,
                 below=below,
-                units=wanted,
+                units=units,
                 findings=findings,
             )
         elif character.body:
             mass, skin_mass = character.mass_kg, character.skin_mass_kg
             job = sample_body(
-                scene, character.body, mapping, mass=mass, frames=frames, units=wanted, skin_mass=skin_mass
+                scene, character.body, mapping, mass=mass, frames=frames, units=units, skin_mass=skin_mass
             )
         else:
             job = sample_prop(
-                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=wanted, findings=findings
+                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=units, findings=findings
             )
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
         if poses:

@@ -104,8 +104,9 @@ def presses(scene, change=lambda: None):
     return state.prints is not before
 
 
-def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again):
-    bake(again)
+@pytest.mark.parametrize("sink_feet", [False, True])
+def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again, sink_feet):
+    bake(again, sink_feet=sink_feet)
     for name in ("relief_strength", "relief", "tread", "shape_keys"):
         assert not presses(again, lambda name=name: CHANGES[name](again, 2)), name
 
