@@ -34,6 +34,7 @@ from ..characters.import_fixes import size_of
 from ..ground import ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
+from ..kept import kept
 from ..response.character_keys import ReadRig, controls_of
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
@@ -169,7 +170,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
-    soft = yield from meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
+    binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
+    soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
     own = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
     terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, own)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from ..checks.volumes import check_volumes
 from ..findings import Finding
+from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
 from ..loads.estimate import CharacterLoads
 from ..motion.motion import CharacterMotion
-from ..numerics.slices import Slices
+from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
@@ -47,14 +48,25 @@ class PressedShot:
     responses: list[CharacterResponse]
 
 
+@sliced
+def loads_standing(
+    wanted: BakeSettings, motions: Sequence[CharacterMotion], terrain: Terrain
+) -> Slices[tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]]:
+    """The motions of a shot as they will walk on the terrain, and their loads; errors as of `loads_of_shot`."""
+    standing = yield from standing_on.slices(motions, terrain, wanted.response)
+    return standing, (yield from loads_of_shot.slices(wanted, standing, terrain))
+
+
 def press_shot(
     wanted: BakeSettings,
     motions: Sequence[CharacterMotion],
+    standing: Sequence[CharacterMotion],
+    loads: list[CharacterLoads],
     ground: SoftGround,
     edits: Mapping[str, StepEdit],
     factors: Array | None = None,
 ) -> Generator[int | None, None, PressedShot]:
-    """Loads, footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
+    """Footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
     lean that the pressed ground gives is the lean that pressed it.
@@ -62,7 +74,10 @@ def press_shot(
     Parameters
     ----------
     wanted : BakeSettings
-    motions : sequence of CharacterMotion
+    motions, standing : sequence of CharacterMotion
+        As they were read, and as they will walk.
+    loads : list of CharacterLoads
+        From `loads_standing`.
     ground : SoftGround
     edits : mapping of step id to StepEdit
     factors : (V, 3) float array, optional
@@ -76,13 +91,11 @@ def press_shot(
     Raises
     ------
     InputError
-        If nobody touches the ground, or the cells are too small for the shot.
+        If the cells are too small for the shot.
     BakeError
         If a footprint breaks an invariant.
     """
     terrain, asked = ground.terrain, wanted.response
-    standing = yield from standing_on.slices(motions, terrain, asked)
-    loads = yield from loads_of_shot.slices(wanted, standing, terrain)
     footprints, forces = yield from _simulate(wanted, loads, ground)
     before = None
     for _ in range(LEAN_PASSES):
