@@ -18,6 +18,8 @@ class State:
     is_baking, progress, status, is_previewing, also_chosen
         What the panel shows of a bake; see `session`. Writing a property has Blender draw the whole window anew, scene
         and all, which takes longer than many a step of a bake; this does not.
+    pressing : session.Pressing or None
+        Prints of the bake that goes on in a window.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
     live : LiveMode or None
@@ -70,6 +72,7 @@ class State:
     progress: float = 0.0
     status: str = ""
     is_previewing: bool = False
+    pressing: Any = None
     also_chosen: tuple[str, ...] = ()
     picking: bool = False
     under: str = ""

@@ -23,6 +23,7 @@ from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
+from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
 from ..kept import kept
 from ..reading.shots import Shot
@@ -87,7 +88,7 @@ def _pressed(
     wanted: BakeSettings, shot: Shot, stood: _Stood, ground: SoftGround, edits: Mapping[str, StepEdit]
 ) -> Job[ShotPrints]:
     at_end, factors = Progress("simulate", 1.0), shot.surface.factors if shot.surface else None
-    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors)
+    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
     carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)

@@ -65,6 +65,7 @@ def press_shot(
     ground: SoftGround,
     edits: Mapping[str, StepEdit],
     factors: Array | None = None,
+    seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, PressedShot]:
     """Footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
 
@@ -82,6 +83,8 @@ def press_shot(
     edits : mapping of step id to StepEdit
     factors : (V, 3) float array, optional
         What is painted on the ground.
+    seen : list of Footprint, optional
+        Takes each print once its contact ends, for who looks on; where bodies lean, once more in each pass.
 
     Yields
     ------
@@ -96,7 +99,7 @@ def press_shot(
         If a footprint breaks an invariant.
     """
     terrain, asked = ground.terrain, wanted.response
-    footprints, forces = yield from _simulate(wanted, loads, ground)
+    footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     before = None
     for _ in range(LEAN_PASSES):
         left = yield from _edited(wanted, ground, footprints, edits)
@@ -107,7 +110,7 @@ def press_shot(
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground)
+        footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     check_volumes(footprints, ground, factors)
     yield None
     left = yield from _edited(wanted, ground, footprints, edits)
@@ -123,7 +126,7 @@ def _edited(
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround
+    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
@@ -132,6 +135,8 @@ def _simulate(
     forces: list[tuple[Array, ...]] = []
     for result in simulate(loads, ground, wanted.cell_size_m):
         footprints += result.footprints
+        if seen is not None:
+            seen += result.footprints
         frames.append(result.frame)
         if wanted.keep_forces:
             forces.append(result.forces)
