@@ -16,7 +16,6 @@ from ..ground.sparse_grid import Window
 from ..imprints.sole_points import SolePoints, flat_pose, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
-from ..motion.sole_motion import Sole
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -209,10 +208,6 @@ class ShotContact:
         if self.points is None:
             return PropLayout(motion.name, sole, steps)
         return SoleLayout(motion.name, sole, steps, self.points)
-
-
-def _is_kept(sole: Sole) -> bool:
-    return sole.prop is None or len(sole.prop.vertices) <= MOST_VERTICES
 
 
 def contacts_of(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[ShotContact]:
