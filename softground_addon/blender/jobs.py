@@ -12,7 +12,7 @@ from ..core.numerics.slices import Slices
 Result = TypeVar("Result")
 State = TypeVar("State")
 
-STAGES = {"sample": 6, "simulate": 3, "write": 1}
+STAGES = {"sample": 2, "simulate": 5, "write": 3}
 """Stages in their order, and the share of the whole time that each takes about, in tenths."""
 
 

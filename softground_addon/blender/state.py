@@ -18,6 +18,8 @@ class State:
     is_baking, progress, status, is_previewing, also_chosen
         What the panel shows of a bake; see `session`. Writing a property has Blender draw the whole window anew, scene
         and all, which takes longer than many a step of a bake; this does not.
+    pressing : session.Pressing or None
+        Prints of the bake that goes on in a window.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
     jobs : list of ModalJob
@@ -57,8 +59,8 @@ class State:
     existing : dict
         Number of users of each object when it was last looked for in the collections, and True if it was in one. Going
         through the collections takes too long to be done in `draw`; who leaves one has a user less.
-    prints : tuple or None
-        What the last bake left, after a hash of all that it follows from; see `baking.shot_prints`.
+    kept : dict
+        Results by name, after a hash of all that they follow from and before their size; see `kept`.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
     catalogues : dict
@@ -69,6 +71,7 @@ class State:
     progress: float = 0.0
     status: str = ""
     is_previewing: bool = False
+    pressing: Any = None
     also_chosen: tuple[str, ...] = ()
     picking: bool = False
     under: str = ""
@@ -92,7 +95,7 @@ class State:
     preset_choices: list[tuple[str, str, str]] = field(default_factory=list)
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
-    prints: tuple[str, Any] | None = None
+    kept: dict[str, tuple[str, Any, int]] = field(default_factory=dict)
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
     catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 

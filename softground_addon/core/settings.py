@@ -229,8 +229,12 @@ class BakeSettings(SceneUnits):
     @property
     def carves(self) -> bool:
         """True if bodies may carve the ground: their feet are let down into it, and both are shown."""
-        sinks = self.response is not None and self.response.grounding is not None
-        return self.carve and self.output == "BOTH" and sinks
+        return self.carve and self.output == "BOTH" and self.sinks
+
+    @property
+    def sinks(self) -> bool:
+        """True if feet are let down into their prints."""
+        return self.response is not None and self.response.grounding is not None
 
     @property
     def fineness(self) -> Fineness:

@@ -200,8 +200,8 @@ def write_prints(
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(left.shaping, **at_the_end(wanted))
-        pressed = yield from meanwhile(Progress("write", 0.1), pressing)
-        yield Progress("write", 0.1)
+        pressed = yield from meanwhile(Progress("write", 0.05), pressing)
+        yield Progress("write", 0.05)
         trail = pressed.trail(trail_detail.FLOOR)
         del pressed
         findings: list[Finding] = []
@@ -224,8 +224,8 @@ def _created(
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
     creating = created_ground.created(drafts, wanted, plan)
-    name, layout = yield from meanwhile(Progress("write", 0.2), creating)
-    yield Progress("write", 0.3)
+    name, layout = yield from meanwhile(Progress("write", 0.1), creating)
+    yield Progress("write", 0.1)
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 
@@ -255,9 +255,9 @@ def _given(
     name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
-        Progress("write", 0.2), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.1), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
-    cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
+    cover = yield from meanwhile(Progress("write", 0.1), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
     too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
@@ -265,16 +265,16 @@ def _given(
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    coarse = yield from meanwhile(Progress("write", 0.2), trail_detail.surface_of.slices(ground, unit_scale))
+    coarse = yield from meanwhile(Progress("write", 0.1), trail_detail.surface_of.slices(ground, unit_scale))
     refinement = yield from meanwhile(
-        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
+        Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
     drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
-    drafted_name = yield from meanwhile(Progress("write", 0.4), drafting)
+    drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
-        Progress("write", 0.4), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.15), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

@@ -177,7 +177,7 @@ def write(
     with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
         ground_mesh.write(found(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
         if place.is_draft:
-            yield Progress("write", 0.9)
+            yield Progress("write", 0.95)
         display_mesh = found(place.display_mesh)
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)

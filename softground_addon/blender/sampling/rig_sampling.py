@@ -7,7 +7,7 @@ user's frame, pose and handlers are left alone. Frame handlers of others act in 
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 
 import bpy
 import numpy as np
@@ -15,6 +15,8 @@ import numpy as np
 from ...core.carving.responded_skin import WornSkin
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
+from ...core.motion.sole_motion import SoleMotion
+from ...core.rig.bones import RigBones
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
 from ...core.rig.recording import Recording, SceneUnits
@@ -22,6 +24,7 @@ from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import LONGEST, skin_stances
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
+from ..kept import kept
 from ..rigs.rig_mapping import rest_bones
 from ..settings import found, name_of, units_of
 from .control_poses import RigPoses
@@ -132,6 +135,20 @@ def recorded_motion(
         for source in mapping.soles
         if source.object
     }
+    read = name, bones, mapping, recording, skin, mass, skin_mass, carried
+    return (yield from kept(len(recording.frames), f"motion of {name}", read, _motion(*read)))
+
+
+def _motion(
+    name: str,
+    bones: RigBones,
+    mapping: RigMapping,
+    recording: Recording,
+    skin: RigSkin | None,
+    mass: float,
+    skin_mass: float,
+    carried: Mapping[str, SoleMotion],
+) -> Sampling:
     count, stances = len(recording.frames), None
     if skin and count <= LONGEST:
         step = float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0

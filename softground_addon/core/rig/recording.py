@@ -31,6 +31,11 @@ class SceneUnits:
     gravity_m_s2: float
     unit_scale_m: float
 
+    @property
+    def units(self) -> SceneUnits:
+        """These alone, without the settings that they are part of."""
+        return SceneUnits(self.frame_rate, self.time_stretch, self.gravity_m_s2, self.unit_scale_m)
+
 
 @dataclass(frozen=True)
 class Recording:
