@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.regions import GroundKind
 from ..ground.soft_ground import SoftGround
 from ..ground.surfaces import find
 from ..legs.grounding import Response
@@ -63,8 +64,7 @@ def with_carves(
     ]
     if not responded:
         return left
-    walls = Walls.of(find(surface), ground.material, ground.gravity)
-    return replace(left, carves=(yield from carves_of.slices(responded, prints, ground, walls)))
+    return replace(left, carves=(yield from carves_of.slices(responded, prints, ground, surface)))
 
 
 @sliced
@@ -72,7 +72,7 @@ def carves_of(
     skins: Sequence[tuple[str, Sequence[str], RespondedSkin]],
     footprints: Mapping[int, Footprint],
     ground: SoftGround,
-    walls: Walls,
+    surface: str,
 ) -> Slices[dict[int, Footprint]]:
     """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
 
@@ -83,15 +83,21 @@ def carves_of(
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
     ground : SoftGround
-    walls : Walls
+    surface : str
+        What it is made of, but for its regions: walls are those of the region that bears most of a step.
     """
     some = next(iter(footprints.values()))
     steps = {
-        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(some.cell_size, some.frame_step))
+        number: CarvedStep(
+            footprint,
+            is_deep(footprint),
+            FootprintRecorder(some.cell_size, some.frame_step),
+            _walls(footprint, ground, surface),
+        )
         for number, footprint in footprints.items()
     }
     frames = skins[0][2].frames
-    carving = CarvedGround(ground, walls, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
+    carving = CarvedGround(ground, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
     bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
@@ -113,6 +119,19 @@ def carves_of(
         yield
         carving.finish(step, float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+
+
+def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
+    """How the ground stands that a step is in: of the kind with the largest part of its contact."""
+    kind = GroundKind(surface, ground.material)
+    if ground.regions:
+        window = footprint.window
+        numbers, shares = ground.regions.under(window, window, footprint.cell_size)
+        parts = (
+            np.ones(1) if shares is None else shares.reshape(len(shares), -1)[:, footprint.contact_cells].sum(axis=1)
+        )
+        kind = ground.regions.kinds[numbers[int(parts.argmax())]]
+    return Walls.of(find(kind.surface), kind.material, ground.gravity)
 
 
 class _Body:
