@@ -113,14 +113,14 @@ def _ripples(graph: Graph, ground: Ground) -> Socket:
     phase = graph.math("FRACT", along, 0.0)
     wave = graph.ramp(phase, 0.0, LEE) * graph.ramp(phase, LEE, 1.0, 1.0, 0.0)
     patches = graph.ramp(graph.noise(ground.place, 2.5, 2.0), 0.38, 0.58, 0.25, 1.0)
-    left = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
-    return wave * patches * left * RIPPLE_HEIGHT
+    untouched = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
+    return wave * patches * untouched * RIPPLE_HEIGHT
 
 
 def dry_sand(graph: Graph, ground: Ground) -> Look:
     """Fine grains of several colours; nothing shines. Sand runs together over most of a tread."""
-    left = graph.ramp(graph.noise(ground.place, RUN_TOGETHER, 2.0, 0.6), 0.46, 0.66)
-    relief, tint = _grains(graph, replace(ground, tread=ground.tread * left))
+    remaining = graph.ramp(graph.noise(ground.place, RUN_TOGETHER, 2.0, 0.6), 0.46, 0.66)
+    relief, tint = _grains(graph, replace(ground, tread=ground.tread * remaining))
     relief = relief + _ripples(graph, ground)
     patches = graph.noise(ground.place, 0.25, 3.0)
     colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))

@@ -106,8 +106,6 @@ def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_s
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    ground : SoftGround
     cell_size : float
         Side of a cell of the bake [m].
     """
@@ -232,8 +230,6 @@ def matching_modulus(
 
     Parameters
     ----------
-    contacts : ShotContacts
-    material : GroundMaterial
     depth : float
         Wanted depth of the typical print [m].
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'

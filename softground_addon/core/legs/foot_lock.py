@@ -112,7 +112,6 @@ def lock(sole: Underside, touching: Mask, weight: Array | None = None) -> Array:
 
     Parameters
     ----------
-    sole : Underside
     touching : (F,) bool array
     weight : (F, Q) float array, optional
         Weight with which each point stays in place, by default that of its bearing; 1 in all of a frame.
@@ -233,7 +232,6 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
 
     Parameters
     ----------
-    sole : Underside
     touching : (F,) bool array
     motion : CharacterMotion
         Whose sole it is, at the same frames.

@@ -36,8 +36,6 @@ class SoleLayout(ContactLayout):
 
     Parameters
     ----------
-    character : str
-    sole : Sole
     steps : Steps
         All of the contact.
     points : SolePoints
