@@ -76,7 +76,8 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     left = baked_ground.record_of(ground)
     made_with = _made_with(scene, left)
     names = painted_ground.names_of(ground, made_with.painted)
-    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, made_with.kinds[1])
+    of_slots, frame = made_with.kinds[1], made_with.frame
+    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, of_slots, frame)
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
     low, high = _extent(left)
     looking = ground_surface.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
@@ -158,6 +159,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             time_stretch=units["time_stretch"],
             gravity_m_s2=units["gravity_m_s2"],
             unit_scale_m=units["unit_scale_m"],
+            frame=baked_ground.frame_in(inputs),
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
             regions=tuple(map(_region, inputs.get("regions", ()))),

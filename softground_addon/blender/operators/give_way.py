@@ -15,6 +15,7 @@ from ...core.settings import SceneUnits
 from .. import mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..operator_base import reports_errors
+from ..placement import hang_on
 from ..plants import give_way, meadow, trampling_table
 from ..translation import translated
 from ..weather.ground_weather import damage_named
@@ -60,7 +61,8 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
         with damage_named(ground):
             units = baked_ground.units_of(about["inputs"])
         trampling_table.ensure(ground)
-        scene_units = SceneUnits(**{name: units[name] for name in _UNITS})
+        frame = baked_ground.frame_in(about["inputs"])
+        scene_units = SceneUnits(**{name: units[name] for name in _UNITS if name in units}, frame=frame)
         trampled_ground.write(ground, tramplings(footprints), scene_units)
     table = trampling_table.ensure(ground)
     for obj in chosen:
@@ -98,12 +100,16 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
         ground = scene.softground.ground
         unit_scale = settings.units_of(scene).unit_scale_m
         shown = baked_ground.display_mesh_of(ground)
-        corners = ground_surface.rest_vertices(shown, unit_scale)[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
+        steps, about = baked_ground.load(ground) if baked_ground.is_baked(ground) else ([], {"inputs": {}})
+        frame = baked_ground.frame_in(about["inputs"])
+        vertices = ground_surface.rest_vertices(shown, unit_scale, frame)
+        corners = vertices[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
         if not len(corners):
             raise InputError(f"Ground '{ground.name}' has no faces that a meadow could grow on.")
-        steps = baked_ground.load(ground)[0] if baked_ground.is_baked(ground) else []
         near = np.array([step.position[:2] for step in steps]) if steps else None
         grass = meadow.grow(corners, unit_scale, near, _REACH)
+        if frame:
+            hang_on(grass, ground, frame)
         for collection in ground.users_collection:
             collection.objects.link(grass)
         _let(ground, [grass], "MEADOW")

@@ -14,6 +14,7 @@ from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
+from ..placement import in_scene
 from ..state import state
 from . import baked_steps
 from .baked_steps import BakedStep
@@ -61,7 +62,7 @@ def centre(scene: bpy.types.Scene, area: Any, step: BakedStep) -> None:
     """Move the middle of the view in an area to a step; the view through a camera stays."""
     space = _viewport(area)
     if space and space.region_3d.view_perspective != "CAMERA":
-        space.region_3d.view_location = Vector(_middle(step).tolist()) / scene.unit_settings.scale_length
+        space.region_3d.view_location = in_scene(_middle(step), scene, baked_steps.frame_of(scene)).tolist()
 
 
 def _viewport(area: Any) -> Any:
@@ -98,8 +99,9 @@ def _show(scene: bpy.types.Scene, area: Any, space: Any) -> None:
     look = (prints[0].left or prints[0].baked).heading + ASIDE
     metre = 1.0 / scene.unit_settings.scale_length
     view, distance = space.region_3d, DISTANCE * reach * metre * space.lens / 50.0
+    at = Vector(in_scene(middle, scene, baked_steps.frame_of(scene)).tolist())
     view.view_perspective = "PERSP"
-    turn(area, Vector(middle) * metre + Vector((0.0, 0.0, RAISED * distance)), look, distance)
+    turn(area, at + Vector((0.0, 0.0, RAISED * distance)), look, distance)
     _light(space.shading, look)
 
 

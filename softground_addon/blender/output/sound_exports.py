@@ -17,6 +17,7 @@ from ...core.files import files
 from ...core.record.footprints import Footprint
 from .. import settings
 from ..ground import baked_ground
+from ..placement import in_scene
 
 
 def write(
@@ -85,14 +86,15 @@ def _seen_by_camera(
             f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make the sound "
             "without Stereo from Camera."
         )
-    unit = scene.unit_settings.scale_length
+    frame_of_bake = baked_ground.frame_in(baked_ground.load(scene.softground.ground)[1]["inputs"])
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []
     try:
         for step in steps:
             footprint = footprints[step.name]
             scene.frame_set(int(footprint.start_frame))
-            place = camera.matrix_world.inverted() @ Vector((footprint.position / unit).tolist())
+            here = in_scene(footprint.position, scene, frame_of_bake)
+            place = camera.matrix_world.inverted() @ Vector(here.tolist())
             seen.append((place.x, max(place.length, 1e-6)))
     finally:
         scene.frame_set(frame, subframe=subframe)

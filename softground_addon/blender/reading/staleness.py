@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.files import report
-from ...core.settings import Acts, BakeSettings, CharacterSettings
+from ...core.settings import DOWN, Acts, BakeSettings, CharacterSettings
 from .. import ground_slots, settings
 from ..compat import SERIES
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
@@ -200,7 +200,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole = {"marks": True, "carve": True, "hard_grounds": (), "regions": (), **inputs}
+    whole = {"marks": True, "carve": True, "hard_grounds": (), "regions": (), "gravity_direction": DOWN, **inputs}
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 

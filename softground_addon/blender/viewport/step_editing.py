@@ -34,6 +34,7 @@ from ..operator_base import OnBake
 from ..operators import baked_steps, show_prints
 from ..operators.baked_steps import BakedStep
 from ..operators.modal_job import STAGE_NAMES, ModalJob
+from ..placement import from_scene
 from ..reading import analysis
 from ..translation import translated
 
@@ -325,7 +326,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
 
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
         step = self.chosen(scene)[0]
-        cursor = np.array(scene.cursor.location)[:2] * scene.unit_settings.scale_length
+        cursor = from_scene(np.array(scene.cursor.location), scene, baked_steps.frame_of(scene))[:2]
         edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
         shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
         if abs(shift) > LONGEST_SHIFT:
