@@ -92,7 +92,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
         world = matrix_in(wanted.frame, obj) if wanted.frame else np.array(obj.matrix_world)
         box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
         inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
-        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj):
+        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj, ground):
             found.append(settings.name_of(obj))
     return found
 

@@ -144,9 +144,9 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 "the same one."
             )
     for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.found(name)):
+        if fault := ground_checks.hard_fault(settings.found(name), ground):
             raise InputError(fault)
-    return ground_frames.framed(wanted)
+    return ground_frames.framed(scene, wanted)
 
 
 def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
@@ -265,7 +265,8 @@ def sample_characters(
             job = sample_prop(
                 scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=wanted, findings=findings
             )
-        motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
+        motion = yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))
+        motions.append(replace(motion, ride=wanted.frame.ride) if wanted.frame else motion)
         if poses:
             rigs.append(ReadRig(controls, poses))
     return motions, tuple(rigs)

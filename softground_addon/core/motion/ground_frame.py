@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .ground_ride import GroundRide
+
 Array = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
@@ -29,6 +31,8 @@ class GroundFrame:
         Scene frame of the first sample of its path.
     path : (F, 4, 4) float array or None
         World to this frame, at each scene frame, while a moving ground is read [Blender units].
+    ride : GroundRide or None
+        What the motion of the ground asks of bodies on it, meanwhile.
     riding : mapping of str to (4, 4) float array
         Objects that move along, by their full names: their own space to this frame [Blender units].
     """
@@ -37,6 +41,7 @@ class GroundFrame:
     moves: bool = field(default=False, metadata={"said_if_on": True})
     first: float = field(default=0.0, compare=False)
     path: Array | None = field(default=None, compare=False)
+    ride: GroundRide | None = field(default=None, compare=False)
     riding: Mapping[str, Array] = field(default_factory=dict, compare=False)
 
     @classmethod
@@ -71,8 +76,9 @@ def rows(matrix: Array) -> Rows:
 def axes_of(ground: Array) -> Array:
     """Axes (..., 3, 3) of a ground's matrices (..., 4, 4), without scale and shear: they turn as the ground does."""
     axes, stretch = np.linalg.qr(ground[..., :3, :3])
-    signs: Array = np.sign(np.diagonal(stretch, axis1=-2, axis2=-1))
-    return np.asarray(axes * signs[..., None, :])
+    axes = axes * np.sign(np.diagonal(stretch, axis1=-2, axis2=-1))[..., None, :]
+    axes[..., 0] *= np.linalg.det(axes)[..., None]  # no mirror image
+    return np.asarray(axes)
 
 
 def upright(up: Array) -> Array:
@@ -89,8 +95,6 @@ def upright(up: Array) -> Array:
 def placed(ground: Array, up: Array) -> Array:
     """The frame of a ground (4, 4) as it lies in the world, (4, 4): its Z is up (3,), the rest is the ground's own."""
     frame, axes = np.eye(4), axes_of(ground)
-    if np.linalg.det(axes) < 0:
-        axes = axes * (-1.0, 1.0, 1.0)
     frame[:3, :3] = axes @ upright(axes.T @ up).T
     frame[:3, 3] = ground[:3, 3]
     return frame

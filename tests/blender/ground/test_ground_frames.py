@@ -11,7 +11,8 @@ from softground_addon.blender import settings
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
-from tests.blender.grounds import bake, field
+from softground_addon.core.errors import InputError
+from tests.blender.grounds import as_rendered, bake, field
 
 MAP = (548000.0, 5932000.0, 0.0)
 WHERE = {
@@ -30,13 +31,14 @@ def moved(scene, matrix):
     bpy.context.view_layer.update()
 
 
-def hung_up(scene):
-    """An empty from which a whole scene hangs."""
+def hung_up(scene, place_of_all=(0, 0, 0)):
+    """Hang a whole scene on an empty at some place."""
     place = bpy.data.objects.new("Place", None)
     for obj in scene.objects:
         if obj.parent is None:
             obj.parent = place
     scene.collection.objects.link(place)
+    place.location = place_of_all
     bpy.context.view_layer.update()
 
 
@@ -114,3 +116,111 @@ def test_a_ground_is_created_under_a_walk_on_a_wall_that_is_far_away(short_walk)
     now = bake(short_walk)
     assert now.report["totals"]["max_depth_m"] == pytest.approx(deepest, rel=1e-2)
     assert short_walk.softground.ground.matrix_world.col[2][:3] == pytest.approx((0, -1, 0), abs=1e-6)
+
+
+def deck(scene, *, keyed=(), cell=0.02):
+    """A walk on a field that both hang from a ship, which is keyed at each frame by a function of the time [s]."""
+    field(scene)
+    scene.softground.cell_size = cell
+    hung_up(scene)
+    ship = bpy.data.objects["Place"]
+    if keyed:
+        for frame in range(-23, 61):
+            ship.location, ship.rotation_euler = keyed(frame / 24)
+            ship.keyframe_insert("location", frame=frame)
+            ship.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    return ship
+
+
+def still(_time):
+    return (0, 0, 0), (0, 0, 0)
+
+
+def sailing(time):
+    return (6 * time, 2 * time, 0), (0, 0, 0)
+
+
+def rising(time):
+    return (0, 0, time * time), (0, 0, 0)
+
+
+@pytest.mark.parametrize("keyed", [still, sailing])
+@pytest.mark.parametrize("away", [False, True])
+def test_prints_on_a_deck_that_is_still_or_sails_evenly_are_those_without_a_deck(short_walk, keyed, away):
+    deck(short_walk)
+    if away:
+        hung_up(short_walk, MAP)
+    before = bake(short_walk).footprints
+    bpy.ops.softground.clear_bake()
+    ship = bpy.data.objects["Place"]
+    for frame in range(-23, 61):
+        ship.location = keyed(frame / 24)[0]
+        ship.keyframe_insert("location", frame=frame)
+    short_walk.frame_set(1)
+    now = bake(short_walk).footprints
+    for here, there in zip(now, before, strict=True):
+        of_both = ((*step.position, step.max_depth_m, step.compressed_m3) for step in (here, there))
+        assert next(of_both) == (next(of_both) if keyed is still else pytest.approx(next(of_both), rel=1e-6, abs=1e-7))
+    assert staleness.reasons(short_walk, settings.snapshot(short_walk)) == ()
+    short_walk.frame_set(20)
+    assert staleness.reasons(short_walk, settings.snapshot(short_walk)) == ()
+
+
+def test_prints_sail_along_with_the_deck(short_walk):
+    deck(short_walk, keyed=sailing)
+    bake(short_walk)
+    shown = baked_ground.display_mesh_of(short_walk.softground.ground)
+    short_walk.frame_set(30)
+    low = as_rendered(shown)[:, 2].argmin()
+    short_walk.frame_set(54)
+    later = as_rendered(shown)[low]
+    short_walk.frame_set(30)
+    assert later - as_rendered(shown)[low] == pytest.approx((6, 2, 0), abs=1e-4)
+
+
+def test_a_lift_that_speeds_up_presses_prints_deeper(short_walk):
+    deck(short_walk)
+    before = bake(short_walk).report["events"]
+    bpy.ops.softground.clear_bake()
+    bpy.data.objects.remove(bpy.data.objects["Place"])
+    bpy.data.objects.remove(short_walk.softground.ground)
+    deck(short_walk, keyed=rising)
+    now = bake(short_walk).report["events"]
+    added = 2 / 9.81
+    for here, there in zip(now, before, strict=True):
+        if there["peak_bw"] > 1.0 and there["phase"] == "foot_flat":
+            assert here["peak_bw"] == pytest.approx(there["peak_bw"] + added, abs=0.02)
+
+
+def test_steps_on_a_crate_that_rides_along_stand_on_it(short_walk):
+    deck(short_walk, keyed=sailing)
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(0, -0.8, -0.01))
+    crate = bpy.context.object
+    crate.scale = (1, 0.5, 0.02)
+    crate.parent = bpy.data.objects["Place"]
+    bpy.context.view_layer.update()
+    short_walk.softground.hard_grounds.add().object = crate
+    steps = bake(short_walk).footprints
+    assert [step for step in steps if abs(step.position[1] + 0.8) < 0.1] == []
+    assert len(steps) == 2
+    crate.parent = None
+    with pytest.raises(InputError, match="'Cube' in Hard Ground stands still while 'Place' moves the ground"):
+        bake(short_walk)
+
+
+def turning_over(time):
+    return (0, 0, 0), (1.5 * time, 0, 0)
+
+
+def test_a_ground_that_turns_over_or_changes_its_size_is_refused(short_walk):
+    ship = deck(short_walk, keyed=turning_over)
+    short_walk.softground.frame_end = 60
+    with pytest.raises(InputError, match=r"Ground 'Field' tilts by up to \d+° against what pulls on it"):
+        bake(short_walk)
+    ship.animation_data_clear()
+    for frame, size in ((1, 1.0), (30, 1.2)):
+        ship.scale = (size,) * 3
+        ship.keyframe_insert("scale", frame=frame)
+    with pytest.raises(InputError, match="Ground 'Field' changes its size in these frames"):
+        bake(short_walk)
