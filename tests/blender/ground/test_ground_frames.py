@@ -8,10 +8,13 @@ import pytest
 from mathutils import Euler, Matrix, Vector
 
 from softground_addon.blender import settings
+from softground_addon.blender.baking import step_edits
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.reading import staleness
+from softground_addon.blender.live import live
+from softground_addon.blender.reading import analysis, staleness
 from softground_addon.core.errors import InputError
+from softground_addon.core.record.edits import StepEdit
 from tests.blender.grounds import as_rendered, bake, field
 
 MAP = (548000.0, 5932000.0, 0.0)
@@ -224,3 +227,56 @@ def test_a_ground_that_turns_over_or_changes_its_size_is_refused(short_walk):
         ship.keyframe_insert("scale", frame=frame)
     with pytest.raises(InputError, match="Ground 'Field' changes its size in these frames"):
         bake(short_walk)
+
+
+def test_feet_sink_into_prints_on_a_sailing_deck_as_on_a_still_one(short_walk):
+    deck(short_walk)
+    bake(short_walk, sink_feet=True)
+    feet = posed(short_walk)
+    bpy.ops.softground.clear_bake()
+    for frame in range(-23, 61):
+        bpy.data.objects["Place"].location = sailing(frame / 24)[0]
+        bpy.data.objects["Place"].keyframe_insert("location", frame=frame)
+    short_walk.frame_set(7)
+    bake(short_walk)
+    assert posed(short_walk) == pytest.approx(feet, abs=1e-4)
+
+
+def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
+    deck(short_walk, keyed=sailing)
+    result = bake(short_walk)
+    short_walk.frame_set(20)
+    edited = step_edits.editable(short_walk)
+    name = edited.left.steps[1].name
+    step_edits.edit(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))})
+    left = baked_ground.record_of(short_walk.softground.ground).edited
+    assert len(left) == len(result.footprints)
+    moves = [new.position - old.position for new, old in zip(left, result.footprints, strict=True)]
+    assert moves[1] == pytest.approx((0.1, 0, 0), abs=0.02)
+    assert moves[0] == pytest.approx((0, 0, 0))
+
+
+def test_what_a_shot_is_known_by_holds_while_the_deck_moves_on(short_walk):
+    deck(short_walk, keyed=sailing)
+    known = analysis.read(short_walk)
+    short_walk.frame_set(20)
+    assert analysis.known(short_walk) is known
+    bpy.data.objects["Place"].location.x = 9
+    bpy.data.objects["Place"].keyframe_insert("location", frame=20)
+    analysis.look_again()
+    assert analysis.known(short_walk) is None
+
+
+def test_live_mode_presses_a_deck_that_sails(short_walk):
+    deck(short_walk, keyed=sailing)
+    bake(short_walk)
+    short_walk.frame_set(30)
+    deepest = as_rendered(baked_ground.display_mesh_of(short_walk.softground.ground))[:, 2].min()
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    try:
+        short_walk.frame_set(30)
+        shown = baked_ground.display_mesh_of(short_walk.softground.ground)
+        assert as_rendered(shown)[:, 2].min() == pytest.approx(deepest, abs=2e-3)
+    finally:
+        live.discard()
