@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...core.findings import Finding, listed
 from ...core.settings import BakeSettings
@@ -44,22 +45,24 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *_distance(dict.fromkeys(movers), wanted),
         *_idle_actions(followed, first, last),
         *_idle_drivers(followed),
-        *shape_findings(object_named(sole.object) for one in wanted.characters for sole in one.soles if sole.object),
+        *shape_findings(
+            object_named(sole.object) for character in wanted.characters for sole in character.soles if sole.object
+        ),
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
-        *_gravity(scene, wanted),
+        *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
 
 
-def _gravity(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
     """Gravity that does not point down."""
     direction = np.array(wanted.gravity_direction)
-    up = np.array(wanted.frame.matrix)[2, :3] if wanted.frame else np.array(UP)
-    if -direction @ up < UPRIGHT:
+    up = np.array(wanted.frame.matrix)[2, :3] if wanted.frame and not wanted.frame.moves else np.array(UP)
+    if -direction @ up < UPRIGHT and not (wanted.frame and wanted.frame.moves):
         yield Finding(
             "gravity_direction",
             "note",
-            f"Gravity of scene '{scene.name}' points along ({', '.join(f'{part:g}' for part in scene.gravity)}), but "
+            f"Gravity of scene '{wanted.scene}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
             "no character stands upright in it: bodies weigh straight down in the bake, by "
             f"{wanted.gravity_m_s2:.2f} m/s².",
             "Set Gravity in the Scene properties to point where the feet of the characters do.",
@@ -175,13 +178,13 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
 
 def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
     """Bodies without an armature, whose contacts are parts of a shape that changes."""
-    for one in wanted.characters:
-        if one.body and any(map(deforms, meshes_of(settings.found(one.body)))):
+    for character in wanted.characters:
+        if character.body and any(map(deforms, meshes_of(settings.found(character.body)))):
             yield Finding(
                 "followed_shape",
                 "note",
-                f"'{one.name}' has no armature: its contacts {listed(sole.name for sole in one.soles)} are parts that "
-                "keep their shape while it changes.",
+                f"'{character.name}' has no armature: its contacts {listed(sole.name for sole in character.soles)} are "
+                "parts that keep their shape while it changes.",
                 "Check in Contacts that each foot is there, and remove what is none.",
             )
 
@@ -202,7 +205,7 @@ def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
 
 def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
     """Copies of what prints that are instances."""
-    showing = instancers(scene, staleness.bodies_of(scene, wanted))
+    showing = instancers(scene, staleness.bodies_of(scene.objects, wanted))
     return [
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())

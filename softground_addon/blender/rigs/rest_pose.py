@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.motion.ground_frame import upright
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array
 from ..placement import felt_gravity
 from ..settings import gravity_direction_of
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.ground_frame import GroundFrame
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 
 _STILL = 1e-4
 """Poses that differ by less are one, over their largest entry."""
@@ -25,7 +25,6 @@ class SceneUnits:
         Scene frames per second [Hz].
     time_stretch : float
         Frames of the animation per frame of the scene.
-    gravity_m_s2, unit_scale_m : float
     frame : GroundFrame or None
         In which a bake is read and solved; None where that is the world's.
     """
@@ -35,6 +34,11 @@ class SceneUnits:
     gravity_m_s2: float
     unit_scale_m: float
     frame: GroundFrame | None = field(default=None, kw_only=True, metadata={"said_if_on": True, "acts": 5})
+
+    @property
+    def units(self) -> SceneUnits:
+        """These alone, without the settings that they are part of."""
+        return SceneUnits(self.frame_rate, self.time_stretch, self.gravity_m_s2, self.unit_scale_m, frame=self.frame)
 
 
 @dataclass(frozen=True)

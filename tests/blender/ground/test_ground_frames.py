@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from softground_addon.blender import settings
-from softground_addon.blender.baking import step_edits
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.live import live
-from softground_addon.blender.reading import analysis, staleness
+from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from softground_addon.core.record.edits import StepEdit
 from tests.blender.grounds import as_rendered, bake, field
@@ -70,7 +70,7 @@ def test_a_bake_is_the_same_wherever_the_shot_is(short_walk, where, parented):
     for here, there in zip(now, before, strict=True):
         assert here.position == pytest.approx(there.position, abs=1e-5)
         assert here.max_depth_m == pytest.approx(there.max_depth_m, abs=1e-5)
-    assert staleness.reasons(scene, settings.snapshot(scene)) == ()
+    assert bake_report.stale_reasons(scene) == ()
 
 
 def test_feet_are_let_down_into_prints_on_a_wall_as_on_level_ground(short_walk):
@@ -165,9 +165,9 @@ def test_prints_on_a_deck_that_is_still_or_sails_evenly_are_those_without_a_deck
     for here, there in zip(now, before, strict=True):
         of_both = ((*step.position, step.max_depth_m, step.compressed_m3) for step in (here, there))
         assert next(of_both) == (next(of_both) if keyed is still else pytest.approx(next(of_both), rel=1e-6, abs=1e-7))
-    assert staleness.reasons(short_walk, settings.snapshot(short_walk)) == ()
+    assert bake_report.stale_reasons(short_walk) == ()
     short_walk.frame_set(20)
-    assert staleness.reasons(short_walk, settings.snapshot(short_walk)) == ()
+    assert bake_report.stale_reasons(short_walk) == ()
 
 
 def test_prints_sail_along_with_the_deck(short_walk):
@@ -246,9 +246,9 @@ def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
     deck(short_walk, keyed=sailing)
     result = bake(short_walk)
     short_walk.frame_set(20)
-    edited = step_edits.editable(short_walk)
+    edited = jobs.run(step_edits.reading(short_walk))
     name = edited.left.steps[1].name
-    step_edits.edit(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))})
+    jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
     left = baked_ground.record_of(short_walk.softground.ground).edited
     assert len(left) == len(result.footprints)
     moves = [new.position - old.position for new, old in zip(left, result.footprints, strict=True)]
