@@ -189,6 +189,8 @@ class BakeSettings(SceneUnits):
         Whether bodies carve deep ground where their feet are let down.
     regions : tuple of RegionSettings
         Slots of the ground that are made of something else, or are hard.
+    under : 'AUTO', 'ALWAYS' or 'NEVER'
+        Whether prints show what lies below the layer; by default where that is thin.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -226,6 +228,7 @@ class BakeSettings(SceneUnits):
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
+    under: str = field(default="AUTO", metadata={**UNSAID, **_on(Acts.WRITING)})
 
     @property
     def spacing_m(self) -> float:

@@ -138,8 +138,9 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
     """The scene's settings, with those that the prints were pressed and put on the ground with."""
     now = settings.snapshot(scene)
     try:
-        inputs = left.about["inputs"]
-        on_ground = {name: type(value)(inputs[name]) for name, value in now.between(Acts.WRITING, Acts.WRITING).items()}
+        inputs = {"under": "AUTO", **left.about["inputs"]}
+        writing = {"under": "AUTO", **now.between(Acts.WRITING, Acts.WRITING)}
+        on_ground = {name: type(value)(inputs[name]) for name, value in writing.items()}
         units = baked_ground.units_of(inputs)
         surfaces.find(inputs["surface"])
         if inputs["pressure"] not in get_args(Pressure):
