@@ -81,7 +81,6 @@ def counted(
         None where as many are done as before.
     stage : str
         One of `STAGES`.
-    count : int
     part, parts : int
         Which of several equal parts the work is.
     share : float

@@ -22,7 +22,6 @@ class State:
         Prints of the bake that goes on in a window.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
-    live : LiveMode or None
     jobs : list of ModalJob
         Those that run in a window.
     hooks : dict
@@ -34,8 +33,8 @@ class State:
         Settings that were taken apart last, and their parts: panels and overlay ask for the same at each drawing.
     depths : dict
         Predicted depths, by identity of an analysis' contacts; emptied with it.
-    told : dict
-        Depth that each scene was told last [m].
+    shown_depths : dict
+        Depth that was shown last for each scene [m].
     aims : dict
         Depth that was typed in each scene.
     predicting : list of jobs
@@ -84,7 +83,7 @@ class State:
     analyses: dict[int, Any] = field(default_factory=dict)
     parted: Any = None
     depths: dict[Any, float] = field(default_factory=dict)
-    told: dict[int, float] = field(default_factory=dict)
+    shown_depths: dict[int, float] = field(default_factory=dict)
     aims: dict[int, Any] = field(default_factory=dict)
     predicting: list[Any] = field(default_factory=list)
     seen: dict[int, Any] = field(default_factory=dict)

@@ -15,7 +15,6 @@ from functools import partial
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings
@@ -49,8 +48,6 @@ from .publish import Published, at_the_end, publish, sign
 from .scene_findings import scene_findings
 from .shot_prints import shot_prints
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class BakeResult:
@@ -60,7 +57,6 @@ class BakeResult:
     ----------
     report : dict
         For JSON (see `core.files.report`).
-    footprints : tuple of Footprint
     """
 
     report: dict[str, object]
@@ -80,7 +76,6 @@ def bake(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     write : bool
         False computes and reports only, and changes nothing.
     wanted : BakeSettings, optional
@@ -96,12 +91,12 @@ def bake(
         If the result fails a check.
     """
     asked = wanted or settings_of(scene)
-    wanted, refused = response_job.without_sinking(scene, asked)
+    wanted, refused = response_job.without_sinking(scene.view_layers[0], asked)
     started = time.perf_counter()
     shot, said = yield from _read(scene, wanted, write=write)
     surface, factors = shot.surface, shot.surface.factors if shot.surface else None
-    edits = step_soles.edits_with_soles(scene, wanted, edits)
-    movers = staleness.of_movers(scene, wanted) | staleness.of_soles(scene, mesh_soles(edits))
+    edits = step_soles.edits_with_soles(scene.objects, wanted, edits)
+    movers = staleness.of_movers(scene.objects, wanted) | staleness.of_soles(scene.objects, mesh_soles(edits))
     ground = ground_of(wanted, shot)
     shot_hash = yield from meanwhile(
         Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
@@ -149,7 +144,7 @@ def bake(
         findings += of_ground
         marks_object.put(published.ground, marks, surface=marks.surface if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
-        response_job.put_layers(scene, wanted, layers)
+        response_job.put_layers(scene.softground, wanted, layers)
     finished = time.perf_counter()
     result = build_report(
         timings={
@@ -173,7 +168,10 @@ def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[t
     shot = yield from read_shot(scene, wanted)
     if write:
         check_motion(wanted, shot.motions)
-    skins = [*bake_report.hidden_skins(scene, wanted, shot.motions), *bake_report.shapes_left_out(scene, wanted)]
+    skins = [
+        *bake_report.hidden_skins(scene.objects, wanted, shot.motions),
+        *bake_report.shapes_left_out(scene.objects, wanted),
+    ]
     return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
 
 
@@ -189,8 +187,6 @@ def write_prints(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    wanted : BakeSettings
     shot : Shot
         Of its ground; the motions are not needed.
     left : BakeRecord

@@ -114,12 +114,10 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
 
     Parameters
     ----------
-    left : BakeRecord
     debris : Debris or None
         What its steps throw, from `with_debris`.
     place : Place
         Where it goes.
-    made_with : BakeSettings
     """
     footprints = left.shaping
     stored = yield from meanwhile(Progress("write", 0.2), record.dump.slices(left))
@@ -203,13 +201,10 @@ def sign(
 
     Parameters
     ----------
-    published : Published
-    made_with : BakeSettings
     hashes : mapping of str to str
         See `staleness.store`; of an edited bake, as `staleness.store_again` takes them.
     summary : mapping
         From `bake_report`.
-    warnings : sequence of str
     stamp : str, optional
         That of the bake that was edited.
     """

@@ -45,7 +45,6 @@ class ShotPrints:
         What steps throw.
     marks : Marks or None
         Those on hard ground.
-    responses : list of CharacterResponse
     findings : tuple of Finding
         What checks say of them.
     happened : list of dict

@@ -106,7 +106,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     InputError
         If not; names what is wrong and the remedy.
     """
-    settings.forget_deleted_ground(scene)
+    settings.forget_deleted_ground(scene.softground)
     setting_paths.check_stored(scene.softground)
     for character in scene.softground.characters:
         rig = character.armature or character.body
@@ -128,7 +128,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     for printing in wanted.characters:
         if printing.armature:
             require_armature(settings.found(printing.armature))
-        check_props(scene, printing.name, printing.soles, ground)
+        check_props(scene.objects, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
@@ -172,8 +172,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
     binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
     soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
-    own = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
-    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, own)
+    hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
+    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
 
 
@@ -183,9 +183,9 @@ def _with_hard(
     motions: list[CharacterMotion],
     ground: Terrain,
     bounds: Array,
-    own: Sequence[MeshTerrain] = (),
+    hard_parts: Sequence[MeshTerrain] = (),
 ) -> Job[tuple[Terrain, list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, own)
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, hard_parts)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
@@ -237,10 +237,10 @@ def sample_characters(
         if character.armature:
             armature = settings.found(character.armature)
             if wanted.response:
-                check_rig(scene, armature, mapping, character.mass_kg)
-                controls = controls_of(scene, armature, mapping)
+                check_rig(scene.objects, armature, mapping, character.mass_kg)
+                controls = controls_of(scene.view_layers[0], armature, mapping)
                 poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
-            grown = size_of(scene, armature) / character.size_m if character.size_m else 1.0
+            grown = size_of(scene.unit_settings.scale_length, armature) / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,
                 armature,

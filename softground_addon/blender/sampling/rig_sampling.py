@@ -89,14 +89,14 @@ def sample_character(
     InputError
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
-    check_rig(scene, armature, mapping, mass)
+    check_rig(scene.objects, armature, mapping, mass)
     check_frames(frames)
     bones = [*bones_of(mapping), *(poses.bones if poses else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
-    if on_bones and meshes_on(scene, armature):
-        skin = yield from meanwhile(0, read_skin.slices(scene, armature))
+    if on_bones and meshes_on(scene.objects, armature):
+        skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
         armature = found(rig)
     units = units or units_of(scene)
     bones += skin.bones if skin and len(frames) <= LONGEST else ()
@@ -125,7 +125,6 @@ def recorded_motion(
     ----------
     recording : Recording
         Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `LONGEST` samples.
-    skin : RigSkin or None
     scene, armature, mapping, mass, skin_mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """
@@ -182,7 +181,7 @@ def sample_prop(
     """
     check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
-    check_props(scene, name, sources)
+    check_props(scene.objects, name, sources)
     check_frames(frames)
     props = list(dict.fromkeys(source.object for source in sources))
     recording = yield from record_props(scene, name, frames, units, props, findings=findings)

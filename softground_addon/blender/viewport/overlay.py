@@ -136,7 +136,7 @@ def draw_numbers() -> None:
 
 def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
     """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
-    shown = live.in_contact(scene)
+    shown = live.in_contact(scene.session_uid)
     if shown is not None:
         windows, size, reach = shown
         touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
@@ -214,19 +214,15 @@ class SOFTGROUND_OT_overlay(ReadingShot):
     cancelled = "The overlay stays hidden"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
-        return _showing(scene)
+        shown = session.current().show_overlay
+        if not shown:
+            yield from analysis.reading(scene)
+        return not shown
 
     def _show(self, result: bool) -> None:
         session.current().show_overlay = result
         session.redraw()
         session.redraw(region_type="WINDOW")
-
-
-def _showing(scene: bpy.types.Scene) -> jobs.Job[bool]:
-    shown = session.current().show_overlay
-    if not shown:
-        yield from analysis.reading(scene)
-    return not shown
 
 
 class SOFTGROUND_OT_read_again(Reading):
@@ -238,16 +234,12 @@ class SOFTGROUND_OT_read_again(Reading):
     cancelled = "The overlay shows nothing until the next edit"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
-        return _read_if_possible(scene)
+        with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+            yield from analysis.reading(scene)
+        return analysis.known(scene) is not None
 
     def _show(self, _result: bool) -> None:
         session.redraw(region_type="WINDOW")
-
-
-def _read_if_possible(scene: bpy.types.Scene) -> jobs.Job[bool]:
-    with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-        yield from analysis.reading(scene)
-    return analysis.known(scene) is not None
 
 
 def read_again() -> float | None:

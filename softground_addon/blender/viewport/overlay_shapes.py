@@ -14,13 +14,13 @@ from ...core.ground.sparse_grid import Window
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.props import posed
 from ...core.motion.sole_motion import Sole
+from ...core.numerics.arrays import Array
 from ...core.numerics.cell_keys import cells_of, keys_of
 from ...core.numerics.intervals import runs
 from ...core.pressing.rim import dilate
 from ...core.record.footprints import Footprint
 from ...core.soles.outlines import convex_hull
 
-Array = NDArray[np.float64]
 Cells = NDArray[np.integer[Any]]
 """Column and row of each cell, (N, 2)."""
 

@@ -45,8 +45,6 @@ class Drawn(NamedTuple):
 
     Attributes
     ----------
-    step : CarvedStep
-    window : Window
     underside : (rows, columns) float array
         Lowest surface over each cell [m], infinite where there is none.
     way : (2,) float array

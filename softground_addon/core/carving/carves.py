@@ -27,7 +27,6 @@ from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 FRAMES_AT_ONCE = 16
@@ -46,11 +45,9 @@ def with_carves(
 
     Parameters
     ----------
-    left : BakeRecord
     responses : iterable of (CharacterMotion, Response)
     skins : mapping of str to WornSkin
         By the names of the characters, of those whose skin was read.
-    ground : SoftGround
     surface : str
         What it is made of.
     """
@@ -82,16 +79,14 @@ def carves_of(
         Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
-    ground : SoftGround
-    walls : Walls
     """
-    some = next(iter(footprints.values()))
+    first = next(iter(footprints.values()))
     steps = {
-        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(some.cell_size, some.frame_step))
+        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(first.cell_size, first.frame_step))
         for number, footprint in footprints.items()
     }
     frames = skins[0][2].frames
-    carving = CarvedGround(ground, walls, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
+    carving = CarvedGround(ground, walls, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
@@ -120,10 +115,10 @@ class _Body:
 
     def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep]) -> None:
         self.poses = _poses(skin)
-        own = [step for step in steps if step.footprint.character == name]
+        of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         for sole, triangles in skin.triangles.items():
-            taken = own if sole == NO_SOLE else [step for step in own if step.footprint.sole == soles[sole]]
+            taken = of_body if sole == NO_SOLE else [step for step in of_body if step.footprint.sole == soles[sole]]
             if taken:
                 self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
 

@@ -34,12 +34,10 @@ class PressedShot:
 
     Attributes
     ----------
-    loads : list of CharacterLoads
     left : BakeRecord
         Its steps, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
-    responses : list of CharacterResponse
     """
 
     loads: list[CharacterLoads]
@@ -74,13 +72,10 @@ def press_shot(
 
     Parameters
     ----------
-    wanted : BakeSettings
     motions, standing : sequence of CharacterMotion
         As they were read, and as they will walk.
     loads : list of CharacterLoads
         From `loads_standing`.
-    ground : SoftGround
-    edits : mapping of step id to StepEdit
     factors : (V, 3) float array, optional
         What is painted on the ground.
     seen : list of Footprint, optional

@@ -57,10 +57,8 @@ def events(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         Of the same steps.
-    surface : str
     first_frame : float
         Of the bake.
 
@@ -86,7 +84,6 @@ def as_edited(table: Sequence[Event], steps: Sequence[EditableStep]) -> list[Eve
 
     Parameters
     ----------
-    table : sequence of Event
     steps : sequence of EditableStep
         From the record.
     """
