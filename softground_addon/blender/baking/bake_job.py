@@ -124,12 +124,12 @@ def bake(
         inputs=inputs,
         input_hash=input_hash,
         steps=left.steps,
-        carves=left.carves,
+        carves=left.laid_carves,
         edits=left.edits,
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, left.steps),
+        events=as_edited(happened, left.steps, left.laid_carves),
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)

@@ -273,7 +273,7 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     table = left.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    return as_edited(table, left.steps)
+    return as_edited(table, left.steps, left.laid_carves)
 
 
 def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:

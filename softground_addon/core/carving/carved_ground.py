@@ -19,7 +19,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import REACH, CarvedCells, Walls
+from .carver import REACH, CarvedCells
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -67,24 +67,30 @@ def _lowest(parts: Sequence[Drawn], window: Window) -> Array:
     return lowest
 
 
+def _numbered(triangles: Indices, count: int) -> tuple[Indices, Indices]:
+    """The vertices of triangles (T, 3), of a count, and the triangles as numbers of these."""
+    place = np.zeros(count, dtype=np.intp)
+    place[triangles] = 1
+    used = np.flatnonzero(place)
+    place[used] = np.arange(len(used))
+    return used, place[triangles]
+
+
 class CarvedGround:
     """The ground of a shot as it is carved."""
 
-    def __init__(
-        self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[CarvedStep], rate: float
-    ) -> None:
-        self._walls, self._cell_size = walls, cell_size
+    def __init__(self, ground: SoftGround, cell_size: float, steps: Sequence[CarvedStep], rate: float) -> None:
+        self._ground, self._cell_size = ground, cell_size
         self._coming = sorted(steps, key=lambda step: step.begins, reverse=True)
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
         self._slides_every, self._frames_to_rest = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
-        self._again = 1.0 - (1.0 - walls.packing) ** (1.0 / (PUSHED * rate))
+        self._frames_to_push = PUSHED * rate
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
         self._highest = 0.0
         """Highest surface over the undisturbed ground so far [m]."""
-        self._layer_depth = ground.material.layer_depth
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._cells = SampledGrid(self._untouched, cell_size, channels=8)
         """Terrain, its openness, the layer's floor, T, K, loose matter; what is recorded of the cut and of this."""
@@ -97,8 +103,8 @@ class CarvedGround:
         window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
         surface = self._undisturbed.surface(window)
         terrain, nothing = np.nan_to_num(surface.heights), np.zeros(x.shape)
-        depth = self._layer_depth * (self._variation.factors(window).depth if self._variation else 1.0)
-        bottom = terrain - depth
+        depth = self._ground.layer_depths(window, self._cell_size)
+        bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
         return np.stack([terrain, surface.bears, bottom, terrain, nothing + np.inf, nothing, nothing, nothing])
 
     def press(self, since: float, frame: float) -> None:
@@ -132,32 +138,38 @@ class CarvedGround:
 
     def drawn(self, step: CarvedStep, around: Array, low: Mask, triangles: Indices) -> Drawn | None:
         """A part of a body over a frame, from its vertices (4, V, 3) around it, and which are low; None if none are."""
-        triangles = triangles[low[triangles].any(axis=1)]
+        triangles = triangles[np.logical_or.reduce([low[corners] for corners in triangles.T])]
         if not len(triangles):
             return None
-        used, triangles = np.unique(triangles, return_inverse=True)
-        around, low = around[:, used], low[used]
-        before, after = around[1:3]
-        way = (after - before)[low]
-        distance = np.linalg.norm(way, axis=1)
-        poses = ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
-        places = cubic(around, 1.0 + np.arange(1, poses + 1) / poses)
-        flat = places[..., :2].reshape(-1, 2)
-        window = Window.around(flat.min(axis=0), flat.max(axis=0), self._cell_size).expanded(self._margin)
-        numbers = triangles.reshape(-1, 3) + len(used) * np.arange(poses)[:, None, None]
+        used, triangles = _numbered(triangles, around.shape[1])
+        around = around[:, used]
+        way = (around[2] - around[1])[:, :2]
+        distance = np.hypot(*way.T) * low[used]
+        needed = np.ceil(np.clip(distance / step.spacing, 1.0, MOST_POSES)).astype(np.int8)
+        of_triangle = np.maximum.reduce([needed[corners] for corners in triangles.T])
+        poses = int(needed.max())
+        between = cubic(np.eye(4), 1.0 + np.arange(1, poses + 1) / poses)
+        places = (between @ around.reshape(4, -1)).reshape(-1, 3)
+        corners = []
+        for number in np.flatnonzero(np.bincount(of_triangle)).tolist():
+            part = triangles[of_triangle == number]
+            corners += [part + len(used) * (-(-poses * pose // number) - 1) for pose in range(1, number + 1)]
+        low_corner, high_corner = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
+        window = Window.around(low_corner, high_corner, self._cell_size).expanded(self._margin)
         origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
         shape = window.rows, window.columns
-        underside = lowest_surface(places.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
-        return Drawn(step, window, underside, way[distance.argmax(), :2])
+        underside = lowest_surface(places, np.concatenate(corners), origin, shape, self._cell_size)
+        return Drawn(step, window, underside, way[distance.argmax()])
 
     def carve(self, part: Drawn, parts: Sequence[Drawn], frame: float) -> None:
         """Cut the ground to one of the parts that are drawn of bodies."""
-        window = part.window
+        window, walls = part.window, part.step.walls
         cells, channels = self._read(window)
         bodies = _lowest(parts, window)
-        cells.cut(np.maximum(part.underside, channels[2]), part.way, self._walls.packing, bodies, again=self._again)
+        again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
+        cells.cut(np.maximum(part.underside, channels[2]), part.way, walls.packing, bodies, again=again)
         if round(frame) % self._slides_every == 0:
-            cells.slide(self._walls, bodies < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
+            cells.slide(walls, bodies < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
         self._write(part.step, window, cells, channels, frame)
 
     def leave(self, step: CarvedStep) -> None:
@@ -167,17 +179,17 @@ class CarvedGround:
 
     def settle(self, parts: Sequence[Drawn], frame: float) -> None:
         """Let what steps have carved slide on around the parts of bodies; at the end, all of it is recorded."""
-        holds = self._walls.strength > 0
-        sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
         for step, frames in list(self._settling.items()):
+            holds = step.walls.strength > 0
+            sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
             cells, _ = self._read(window)
-            window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
+            window = window.expanded(step.walls.reach(cells.surface, cells.loose, self._cell_size))
             cells, channels = self._read(window)
             if not holds and frames == self._frames_to_rest:
                 cells.gather(channels[7] * QUANTUM, THIN)  # then its edges slide as well
             body = _lowest(parts, window) < cells.surface + self._cell_size
-            cells.slide(self._walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
+            cells.slide(step.walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
             if holds and frames == 1:
                 cells.gather(channels[7] * QUANTUM, THIN)
             if frames == 1:

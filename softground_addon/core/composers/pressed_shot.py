@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks.volumes import check_volumes
+from ..errors import InputError
 from ..findings import Finding
+from ..ground.deep_ground import wading
 from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
 from ..loads.estimate import CharacterLoads
-from ..motion.motion import CharacterMotion
+from ..motion.motion import CharacterMotion, shortest_sole
 from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
 from ..settings import TIME_LIMIT, BakeSettings
 from .edited_steps import with_edits
+from .prediction import pressed_contacts
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
 from .shot_loads import loads_of_shot
 from .simulation import simulate
@@ -94,6 +97,8 @@ def press_shot(
         If a footprint breaks an invariant.
     """
     terrain, asked = ground.terrain, wanted.response
+    if wanted.carves:
+        yield from _check_carving(wanted, loads, ground)
     footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     before = None
     for _ in range(LEAN_PASSES):
@@ -111,6 +116,16 @@ def press_shot(
     left = yield from _edited(wanted, ground, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, left, asked)
     return PressedShot(loads, left, forces, responses)
+
+
+def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
+    """Raise InputError if legs would carve the ground for longer, or more of it, than the bake may take."""
+    try:
+        check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s, set_by=TIME_LIMIT)
+    except InputError as error:  # if it is deep
+        depths = (yield from pressed_contacts.slices(loads, ground, wanted.cell_size_m)).depths
+        if wading(depths.max(initial=0.0), shortest_sole([character.motion for character in loads])) > 0:
+            raise InputError(f"Legs carve deep ground. {error} Or turn Carve off.") from None
 
 
 def _edited(

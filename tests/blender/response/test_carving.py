@@ -6,17 +6,20 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs, settings
+from softground_addon.blender import ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
 from softground_addon.core.carving import carves
+from softground_addon.core.errors import InputError
+from softground_addon.core.ground import presets
 from softground_addon.core.ground.sparse_grid import TILE, Window
 from softground_addon.core.pressing.repose import NEIGHBOURS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from tests.blender import shots
+from tests.blender.grounds import field
 
 FRAMES = 44
 CELL = 0.01
@@ -134,6 +137,15 @@ def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scen
     lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
     assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
     assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
+    waded = {row["step"]: row for row in report["events"] if row["phase"] == "wade"}
+    assert waded.keys() == {step_id(left.footprints[number]) for number in left.carves}
+    for number, carve in left.carves.items():
+        row, (low, high) = waded[step_id(left.footprints[number])], carve.window.corners(CELL)
+        assert carve.start_frame <= row["frame"] <= row["frame"] + 24 * row["duration_s"] <= carve.end_frame
+        assert row["time_s"] == pytest.approx((row["frame"] - 1) / 24, abs=1e-5)
+        assert (low < row["position"][:2]).all()
+        assert (row["position"][:2] < high).all()
+        assert row["surface"] == "snow"
     again = record.load(record.dump(left)).carves
     assert again.keys() == left.carves.keys()
     for number, carve in left.carves.items():
@@ -161,6 +173,29 @@ def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
         assert np.degrees(np.arctan(slope[at_rest[one] & at_rest[other]].max())) < 33.0
 
 
+def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatch, tmp_path):
+    monkeypatch.setattr(preset_files, "user_folder", lambda: tmp_path)
+    walker(scene, **SHIN_DEEP)
+    options, ground = scene.softground, field(scene, vertices=120, size=6.0)
+    options.detail, options.debris, options.marks = "NEVER", False, False
+    expected = bake(scene)[1]
+    deep = ground_presets.as_preset(options, "Deep")
+    (tmp_path / "deep.json").write_text(presets.dump(deep))
+    ground.data.materials.append(bpy.data.materials.new("Bank"))
+    ground.data.materials[0].softground_preset = "deep"
+    bpy.ops.softground.load_preset(name="Dry Sand")
+    options.cell_size, options.debris = CELL, False
+    options.pressure = "CENTRE_OF_PRESSURE"
+    left = bake(scene)[1]
+    assert {step.surface for step in left.footprints} == {"snow"}
+    assert left.carves.keys() == expected.carves.keys()
+    assert left.carves
+    for number, carve in left.carves.items():
+        whole = expected.carves[number]
+        assert np.array_equal(carve.tile(carve.rim), whole.tile(whole.rim))
+        assert np.array_equal(carve.tile(carve.compression), whole.tile(whole.compression))
+
+
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     walker(scene, **DEEP)
     _, left = bake(scene)
@@ -178,6 +213,53 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
     assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
+
+
+def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
+    walker(scene, **DEEP)
+    scene.softground.ground_margin = 2.0
+    _, left = bake(scene)
+    number, beside = min(left.carves), (0.0, 1.5)
+    step, carve = left.footprints[number], left.carves[number]
+    name = step_id(step)
+
+    def edited(edits):
+        step_edits.edit(scene, step_edits.editable(scene), edits)
+        return baked_ground.record_of(scene.softground.ground)
+
+    def lying(records, away=(0.0, 0.0)):
+        """Heights around the hole, or as far away from it."""
+        window = carve.window.expanded(5)
+        x, y = np.meshgrid(*window.centres(CELL))
+        compression, rim = recompose(records).nearest(x + away[0], y + away[1])
+        return rim - compression
+
+    moved = edited({name: StepEdit(move_m=beside)})
+    there = moved.laid_carves[number]
+    assert np.abs(lying([there], beside) - lying([carve])).max() < 1e-6
+    assert there.tile(there.rim).sum() == pytest.approx(carve.tile(carve.rim).sum(), rel=1e-6)
+    copied = edited({f"{name}+1": StepEdit(move_m=beside)})
+    assert np.array_equal(lying([copied.laid_carves[number + len(left.footprints)]], beside), lying([there], beside))
+    assert copied.laid_carves[number] is copied.carves[number]
+    edited({name: StepEdit(move_m=(0.0, 0.1), shift_frames=4)})
+    report, again = bake(scene)
+    assert again.carved_with == {name: StepEdit(move_m=(0.0, 0.1))}
+    assert again.laid_carves[number].start_frame == again.carves[number].start_frame + 4
+    assert report["totals"]["carved_m3"] == pytest.approx(
+        sum(c.compressed_m3 for c in again.carves.values()), rel=1e-12
+    )
+    at_bake, back = again.carves[number], edited({}).laid_carves[number]
+    before, after = (np.array(each.window[:2]) + np.array(each.window[2:]) / 2 for each in (at_bake, back))
+    assert (after - before) * CELL == pytest.approx([0.0, -0.1], abs=CELL)
+
+
+def test_a_bake_is_refused_that_carving_makes_too_long(scene, monkeypatch):
+    walker(scene, **DEEP)
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.CARVED", 1e6)
+    with pytest.raises(InputError, match=r"Legs carve deep ground\. .*Or turn Carve off"):
+        bake(scene)
+    scene.softground.material.youngs_modulus = 10e6
+    assert not bake(scene)[1].carves
 
 
 def test_a_bake_from_before_carving_is_still_current(scene):
