@@ -209,7 +209,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         "gravity_direction": DOWN,
         "under": "AUTO",
     }
-    whole = unsaid | {"gravity_direction": DOWN} | dict(inputs)
+    whole: dict[str, Any] = unsaid | {"gravity_direction": DOWN} | dict(inputs)
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
