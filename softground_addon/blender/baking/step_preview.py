@@ -26,13 +26,7 @@ REACH = 4.0
 
 
 class StepPreview:
-    """The ground of a bake, finished, as it would be with other edits.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    bake : EditableBake
-    """
+    """The ground of a bake, finished, as it would be with other edits."""
 
     def __init__(self, ground: bpy.types.Object, bake: EditableBake) -> None:
         shown = baked_ground.display_mesh_of(ground)

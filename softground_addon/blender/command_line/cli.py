@@ -25,8 +25,8 @@ from ...core.record.edits import StepEdit, from_json
 from .. import ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
-from ..ground_slots import user_folder
 from ..output import export_formats
+from ..preset_files import user_folder
 from ..response import response_job
 from . import cli_arguments, program
 from .saving import check_places, files_read, save_copy, save_target
@@ -203,7 +203,7 @@ def _export(options: argparse.Namespace) -> None:
         _open(options.blend)
     scene = _scene(options.scene)
     kind = options.format.upper().replace("-", "_")
-    asked = options.output.absolute() if options.output else export_formats.default_path(scene, kind)
+    asked = options.output.absolute() if options.output else export_formats.default_path(scene.softground.ground, kind)
     path = export_formats.check_suffix(asked, kind)
     start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
     if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:

@@ -7,9 +7,10 @@ from bpy.props import StringProperty
 
 from ...core.errors import InputError
 from .. import settings
-from ..ground import ground_checks
+from ..ground import ground_checks, trail_detail
 from ..operator_base import reports_errors
 from ..translation import translated
+from .panel_base import chosen_of, remove_chosen
 
 
 class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
@@ -31,7 +32,8 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
         if self.object:
             chosen = [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
-        chosen = [obj for obj in chosen if obj != options.ground and obj not in settings.hard_grounds_of(options)]
+        taken = [options.ground, *settings.hard_grounds_of(options)]
+        chosen = [obj for obj in chosen if trail_detail.ground_of(obj) not in taken]
         if not chosen:
             raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")
         for obj in chosen:
@@ -54,13 +56,10 @@ class SOFTGROUND_OT_remove_hard_ground(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether an object is chosen in the list."""
-        options = settings.options_of(context)
-        return 0 <= options.active_hard_ground < len(options.hard_grounds)
+        return chosen_of(settings.options_of(context), "hard_grounds", "active_hard_ground") is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        options = settings.options_of(context)
-        options.hard_grounds.remove(options.active_hard_ground)
-        options.active_hard_ground = max(0, min(options.active_hard_ground, len(options.hard_grounds) - 1))
+        remove_chosen(settings.options_of(context), "hard_grounds", "active_hard_ground")
         return {"FINISHED"}
 
 

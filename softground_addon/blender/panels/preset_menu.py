@@ -15,9 +15,9 @@ from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, jobs, settings
 from ..characters.character_setup import characters_of, title_of
-from ..ground_slots import listed, loaded, user_folder
 from ..operator_base import OnShot, reports_errors
 from ..operators.modal_job import ReadingShot, Reports
+from ..preset_files import listed, loaded, user_folder
 from ..reading import analysis
 from ..translation import CONTEXT, translated
 from . import preset_icons
@@ -210,20 +210,16 @@ class SOFTGROUND_OT_predict_depth(ReadingShot):
     cancelled = "Predict Depth cancelled"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        return _predicting(scene)
-
-
-def _predicting(scene: bpy.types.Scene) -> jobs.Job[Reports]:
-    analysis.forget()
-    known = yield from analysis.reading(scene)
-    depth = yield from analysis.working_out_depth(scene)
-    deepest = known.contacts.depths.max(initial=0.0)
-    text = translated(
-        "Typical step: {typical} cm deep; the deepest: {deepest} cm",
-        typical=f"{(depth or 0.0) * 100:.1f}",
-        deepest=f"{deepest * 100:.1f}",
-    )
-    return [("INFO", text)]
+        analysis.forget()
+        known = yield from analysis.reading(scene)
+        depth = yield from analysis.working_out_depth(scene)
+        deepest = known.contacts.depths.max(initial=0.0)
+        text = translated(
+            "Typical step: {typical} cm deep; the deepest: {deepest} cm",
+            typical=f"{(depth or 0.0) * 100:.1f}",
+            deepest=f"{deepest * 100:.1f}",
+        )
+        return [("INFO", text)]
 
 
 class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):

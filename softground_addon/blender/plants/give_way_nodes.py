@@ -193,7 +193,7 @@ def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Pla
     first = graph.number(graph.at_index(table.vertices, graph.attribute(FIRST, "INT"), slot, "INT"))
     latest = first + begun - 1.0
     chance = graph.number(graph.attribute(_CHANCE))
-    by, way, left = _pass(graph, table, latest.socket)
+    by, way, remaining = _pass(graph, table, latest.socket)
     older, older_way, older_left = _pass(graph, table, (latest - 1.0).socket)
     is_second = begun.above(1.5)
     angle, weight = bend(by, plant, frame, table.frame_rate, chance)
@@ -203,7 +203,7 @@ def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Pla
 
     pressed = ((frame - by.start) / (by.end - by.start).at_least(1.0)).within_one()
     height, *slope = (
-        old * is_second + (new - old * is_second) * pressed for new, old in zip(left, older_left, strict=True)
+        old * is_second + (new - old * is_second) * pressed for new, old in zip(remaining, older_left, strict=True)
     )
     x, y, _ = graph.parts(graph.vector("FRACTION", _in_cells(graph, table)))
     height = height + slope[0] * (x - 0.5) + slope[1] * (y - 0.5)
@@ -224,8 +224,8 @@ def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tu
     is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
-        graph.link(each, next(one for one in random.inputs if one.name == "ID"))
-    chance = next(one for one in random.outputs if one.enabled)
+        graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
+    chance = next(socket for socket in random.outputs if socket.enabled)
     geometry = graph.store(geometry, _CHANCE, chance, is_touched, domain=domain)
     geometry = graph.store(geometry, _MOVED, touched[1], is_touched, "FLOAT_VECTOR", domain)
     x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
@@ -285,7 +285,7 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
     def total(value: Any, kind: str = "FLOAT") -> Any:
         node = graph.accumulated(value, kind)
         graph.link(island, node.inputs["Group ID"])
-        return next(one for one in node.outputs if one.name == "Total" and one.enabled)
+        return next(socket for socket in node.outputs if socket.name == "Total" and socket.enabled)
 
     height = graph.number(graph.dot(position, table.up))
     low = graph.number(1.0)
@@ -297,6 +297,6 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
     mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, touched, island)
     mesh = _put(graph, table, mesh, position)
     joined = graph.node("GeometryNodeJoinGeometry")
-    for part in [mesh, *(one for one in parts.outputs if one.name != "Mesh")]:
+    for part in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
         graph.link(part, joined.inputs["Geometry"])
     return joined.outputs["Geometry"]

@@ -18,13 +18,12 @@ from ..ground.surfaces import CarriedFilm
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.record import EditableStep
 from .film import ZONES, CarriedMass, Meeting, carry, share_left
 from .hard_print import HardPrint, SoleGrid, laid, sole_grid
-
-Array = NDArray[np.float64]
 
 LOOKED_AT = 32
 """Steps of a contact at which it is looked at, about."""
@@ -51,7 +50,6 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
-    carried : CarriedMass
     surface : str
         What they are of.
     """
@@ -93,10 +91,8 @@ def marks_of(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     steps : sequence of EditableStep
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
-    terrain : Terrain
     surface : str
         What soles take up, of all that the ground is made of.
     shed : mapping of int to float, optional
@@ -127,7 +123,7 @@ def marks_of(
             for during in _pieces(hard[:, index], slid := _slid(character, index)):
                 contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
                 yield
-            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
+            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda meeting: meeting.frame)
             giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
             booked += of_sole
             given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}

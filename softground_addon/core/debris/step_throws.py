@@ -45,14 +45,12 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         That they left.
-    surface : str
     """
     throws: list[Throw] = []
     for character in loads:
-        of_character = phases.phases(character)
+        of_character = [phase for phase in phases.phases(character) if not phase.hard]
         sliding = np.zeros(character.contacts.touching.shape, bool)
         for phase in of_character:
             if phase.kind == "slide_start":

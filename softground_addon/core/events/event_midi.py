@@ -39,10 +39,6 @@ def dump(events: Sequence[Event]) -> bytes:
 
     A step is a note by surface and foot, as long as its contact, its velocity 127·clip(F/(3 BW), 0, 1)^0.7;
     controllers before it carry slide and depth. The other phases are text markers.
-
-    Parameters
-    ----------
-    events : sequence of Event
     """
     who = list(dict.fromkeys(row["character"] for row in events))
     channels = [channel for channel in range(16) if channel != PERCUSSION]
@@ -64,7 +60,9 @@ def velocity(peak_bw: float) -> int:
 
 def note(event: Event) -> int:
     """Of an event's surface and foot."""
-    return surfaces.find(event["surface"]).midi_note + {"L": 0, "R": 1}.get(event["side"], 2)
+    on = event["surface"]
+    of_surface = surfaces.HARD_NOTE if on == surfaces.HARD else surfaces.find(on).midi_note
+    return of_surface + {"L": 0, "R": 1}.get(event["side"], 2)
 
 
 def _messages(event: Event, channel: int) -> Iterable[_Message]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..numerics import cell_keys
+from ..numerics.arrays import Array
 from .heightfield import Terrain
 from .terrain import SAME_LAYER, MeshTerrain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,14 +46,12 @@ class Weathering(Protocol):
         ----------
         ground : HeightField
             As it was left by steps.
-        window : Window
         since : (rows, columns) float array
             Frame at which each cell changed last.
         trodden : SparseGrid
             1 in cells that were ever in contact, else 0.
         pressed : (rows, columns) float array
             How far steps compressed each cell, all together [m].
-        frame : float
         section : float or None
             Volume of a print over its width [m²], None where it is not known yet.
 
@@ -72,7 +70,6 @@ class SoftGround:
     ----------
     terrain : Terrain
         The undisturbed ground.
-    material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
         How the force on a sole spreads over its contact.
     variation : Variation or None
@@ -104,3 +101,11 @@ class SoftGround:
         if self.regions is None:
             return [self.material]
         return [self.regions.kinds[number].material for number in self.regions.under(window, window, cell_size)[0]]
+
+    def layer_depths(self, window: Window, cell_size: float) -> Array | float:
+        """Depth of the loose layer in the cells of a window, (rows, columns) or of all of them [m]."""
+        if self.regions is None:
+            return self.material.layer_depth
+        numbers, shares = self.regions.under(window, window, cell_size)
+        depths = np.array([self.regions.kinds[number].material.layer_depth for number in numbers])
+        return float(depths[0]) if shares is None else np.asarray(np.tensordot(depths, shares, 1))

@@ -169,7 +169,6 @@ class SurfaceRecord:
         As presets and records name it.
     density : float
         Of the loose matter [kg/m³]; sand is quartz of 2,650 with 40 % of pores.
-    thrown, fragments, voice : ThrownMatter, Fragments, Voice
     colour : (float, float, float)
         Of its pieces, and of the ground in Solid shading.
     shades, swell : (float, float), float
@@ -293,6 +292,13 @@ SURFACES = {record.name: record for record in (
     ),
 )}  # fmt: skip
 """Surfaces by name, in the order in which the user sees them."""
+
+HARD = "hard"
+"""In place of a surface: a floor that bears and takes no print, such as rock, stone tiles, a deck."""
+HARD_VOICE = Voice(1.0, 0.15, 0.5, 0.0, (350, 2600), (0.002, 0.009), 0.0, 1.5, (1500, 6000), (90, 160))
+"""Sound of a shoe on it: most of the power of such steps lies below 2.5 kHz and within 30 ms of the strike (by ear)."""
+HARD_NOTE = 56
+"""As `SurfaceRecord.midi_note`."""
 
 
 def find(name: object, origin: str = "Ground") -> SurfaceRecord:

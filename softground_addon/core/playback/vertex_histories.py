@@ -66,7 +66,6 @@ class VertexHistories:
     movement : Ramps
         Change of the displayed height, and displayed compression, this to `SHADING_TOLERANCE` [m]; the rim is the sum
         of both.
-    contacts : PointContacts
     error : float
         Largest error of a displayed height, at any place and frame [m].
     """
@@ -100,7 +99,6 @@ def vertex_histories(
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     x, y : (K,) float arrays
         World positions [m].
     blur_sigma : float

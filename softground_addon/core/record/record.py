@@ -145,8 +145,6 @@ class EditableStep:
         As it was baked; of a copy, its original.
     left : Footprint or None
         As it lies on the ground, without the thrown volume; None if nothing of it does.
-    edit : StepEdit
-    is_copy : bool
     thrown : mapping of str to float
         Thrown volumes by phase [m³].
     """

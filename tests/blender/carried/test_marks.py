@@ -198,8 +198,8 @@ def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
 def test_marks_stay_while_steps_on_the_ground_are_edited(scene):
     ground = scene.softground.ground
     before = mesh_arrays.positions(marks_object.of(ground).data).tobytes()
-    editing = step_edits.editable(scene)
-    step_edits.edit(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)})
+    editing = jobs.run(step_edits.reading(scene))
+    jobs.run(step_edits.editing(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)}))
     assert mesh_arrays.positions(marks_object.of(ground).data).tobytes() == before
 
 
