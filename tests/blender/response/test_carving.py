@@ -207,8 +207,9 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     assert len(without.shaping) == len(left.shaping) - 2
     assert without.carves.keys() == left.carves.keys()
     wanted = settings.snapshot(scene)
-    assert not staleness.reasons(scene.softground.ground, scene.objects, wanted)
-    assert staleness.reasons(scene.softground.ground, scene.objects, replace(wanted, carve=False)) == (
+    of = scene.softground.ground, scene.objects
+    assert not staleness.reasons(*of, wanted)
+    assert staleness.reasons(*of, replace(wanted, carve=False)) == (
         "The settings have changed",
     )
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
