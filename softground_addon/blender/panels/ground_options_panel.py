@@ -98,9 +98,8 @@ class SOFTGROUND_PT_layers(AdvancedPanel, bpy.types.Panel):
             column.prop(material, field)
         row = column.row(heading="Densest Packing")
         row.prop(material, "packs", text="")
-        packing = row.row()
-        packing.active = material.packs
-        packing.prop(material, "densest", text="")
+        if material.packs:
+            row.prop(material, "densest", text="")
         for field in ("edge_width_cm", "spread", "cohesionless"):
             column.prop(material, field)
 
