@@ -185,6 +185,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         marks=options.marks,
+        under=options.under,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),
     )
