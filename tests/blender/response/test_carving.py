@@ -207,10 +207,9 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     assert len(without.shaping) == len(left.shaping) - 2
     assert without.carves.keys() == left.carves.keys()
     wanted = settings.snapshot(scene)
-    assert not staleness.reasons(scene.softground.ground, scene.objects, wanted)
-    assert staleness.reasons(scene.softground.ground, scene.objects, replace(wanted, carve=False)) == (
-        "The settings have changed",
-    )
+    of = scene.softground.ground, scene.objects
+    assert not staleness.reasons(*of, wanted)
+    assert staleness.reasons(*of, replace(wanted, carve=False)) == ("The settings have changed",)
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
@@ -226,7 +225,7 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     name = step_id(step)
 
     def edited(edits):
-        step_edits.edit(scene, step_edits.editable(scene), edits)
+        jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), edits))
         return baked_ground.record_of(scene.softground.ground)
 
     def lying(records, away=(0.0, 0.0)):
