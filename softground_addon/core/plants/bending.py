@@ -22,6 +22,8 @@ MOST_LASTING = 0.95
 """Share of lying flat that stays for good, at most: broken stems spring up a little."""
 BRUSHED = 0.35
 """Share of the bend that is left by a sole which passes above the ground."""
+NO_ONE, EVERYONE = 0.0, 2.0
+"""Chances of a blade that is never worn down, and of one that always is."""
 _TOUCHING = 1e-6
 """Clearance below which a sole lies on the root [m]."""
 
