@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.ground.surfaces import SurfaceRecord
+from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.weather import weather
 from ..node_graph import NodeGraph, Number
 from ..node_modifiers import new_group
@@ -42,7 +42,7 @@ MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
 """In metres per second."""
 
 
-def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
+def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     """A new node group for marks of a surface, in a scene whose time counts so many frames per second."""
     assert surface.carried is not None
     graph = NodeGraph(new_group(GROUP, MARK))
@@ -63,7 +63,7 @@ def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
     return graph.tree
 
 
-def _inputs(graph: NodeGraph, surface: SurfaceRecord) -> tuple[Any, dict[str, Number]]:
+def _inputs(graph: NodeGraph, surface: SurfaceRecord | Liquid) -> tuple[Any, dict[str, Number]]:
     interface = graph.tree.interface
     for way in ("INPUT", "OUTPUT"):
         interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

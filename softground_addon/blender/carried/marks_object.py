@@ -46,7 +46,7 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
         mesh = _mesh(marks, surface, units)
         group = _group_for(modifier and modifier.node_group, surface, units)
         if not older or _is_ours_of_another(older, surface):
-            mesh.materials.append(material_for(surfaces.find(surface)))
+            mesh.materials.append(material_for(surfaces.sticking(surface)))
     obj = older or bpy.data.objects.new(NAME, mesh)
     if older:
         if len(mesh.materials):
@@ -95,7 +95,7 @@ def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
     frame_rate = units.frame_rate * units.time_stretch
     made_for = f"{surface} {frame_rate}"
     if not group or group.get(MADE_FOR) != made_for:
-        group = nodes.build(surfaces.find(surface), frame_rate=frame_rate)
+        group = nodes.build(surfaces.sticking(surface), frame_rate=frame_rate)
         group[MADE_FOR] = made_for
     return group
 
@@ -114,7 +114,7 @@ def _play(modifier: Any, group: Any) -> None:
 
 def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     """The mesh of marks, as seen from its first vertex."""
-    record = surfaces.find(surface)
+    record = surfaces.sticking(surface)
     assert record.carried is not None
     unit_scale = units.unit_scale_m
     thick = marks.position + (0.0, 0.0, 1.0) * (marks.mass / record.density)[:, None]

@@ -164,6 +164,8 @@ class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
         buttons = row.column(align=True)
         buttons.operator("softground.add_hard_ground", text="", icon="ADD")
         buttons.operator("softground.remove_hard_ground", text="", icon="REMOVE")
+        if 0 <= options.active_hard_ground < len(options.hard_grounds):
+            self.layout.prop(options.hard_grounds[options.active_hard_ground], "wet")
 
 
 class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):

@@ -200,7 +200,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole = {"marks": True, "carve": True, "hard_grounds": (), "regions": (), **inputs}
+    whole = {"marks": True, "carve": True, "hard_grounds": (), "wet_grounds": (), "regions": (), **inputs}
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 

@@ -14,7 +14,8 @@ from ..events.phases import normal_force, slide_speed
 from ..ground import surfaces
 from ..ground.hard_ground import HardOnSoft
 from ..ground.heightfield import Terrain
-from ..ground.surfaces import CarriedFilm
+from ..ground.surfaces import Liquid, SurfaceRecord
+from ..ground.terrain import SAME_LAYER
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
@@ -70,12 +71,12 @@ class Marks:
 
 @dataclass(frozen=True)
 class _Contact:
-    """A contact of a sole with a hard floor: as it meets it, where it lies, the share each node leaves, its frames."""
+    """A contact of a sole with a hard floor: where it lies, its slide in sole lengths, frames, and what wets it."""
 
-    meeting: Meeting
     laid: HardPrint
-    shares: Array
+    slid: float
     frames: Array
+    wet: str
 
 
 @sliced
@@ -89,7 +90,9 @@ def marks_of(
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
     brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
-    """What soles leave on the hard floors of a shot; None where there is none, or the ground does not stick.
+    """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
+
+    Of several grounds and liquids that stick, that of which most is left.
 
     Parameters
     ----------
@@ -98,58 +101,92 @@ def marks_of(
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     terrain : Terrain
     surface : str
-        What soles take up, of all that the ground is made of.
+        What the ground is made of; a step in another kind of it says so.
     shed : mapping of int to float, optional
-        Mass that each step sheds in the air, by its number [kg].
+        Volume that each step sheds in the air, by its number [m³].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
     brought : mapping of str to float, optional
-        Film on the soles of a character as the shot starts, over the thickest, by its name.
+        Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
     """
-    carried = surfaces.find(surface).carried
-    if carried is None or not isinstance(terrain, HardOnSoft):
+    if not isinstance(terrain, HardOnSoft):
         return None
-    parts: list[Marks] = []
-    booked, count = CarriedMass(), 0
+    kinds = dict.fromkeys([surface, *(step.left.surface for step in steps if step.left and step.left.surface)])
+    sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
+    sticking = [kind for kind in sticking if kind.carried is not None]
+    parts: dict[str, list[Marks]] = {kind.name: [] for kind in sticking}
+    booked = dict.fromkeys(parts, CarriedMass())
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             yield
-            if motion.sole.prop is not None:
-                continue
-            sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
-            soft = list(_soft_meetings(character, index, sticky, shed))
-            hard = character.contacts.hard
-            dirty = brought.get(character.motion.name, 0.0)
-            if not (soft or dirty) or hard is None or not hard[:, index].any():
+            soft = {kind: list(_soft_meetings(character, index, steps, kind, surface, shed)) for kind in parts}
+            dirty, hard = brought.get(character.motion.name, 0.0), character.contacts.hard
+            takes = any(soft.values()) or dirty or terrain.wet
+            if not takes or motion.sole.prop is not None or hard is None or not hard[:, index].any():
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
             for during in _pieces(hard[:, index], slid := _slid(character, index)):
-                contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
+                contacts.append(_contact(character, index, grid, during, slid, terrain))
                 yield
-            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda one: one.frame)
-            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
-            booked += of_sole
-            given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
-            for contact in contacts:
-                film = given[id(contact.meeting)]
-                if (film[grid.zone] * contact.shares > 0).any():
-                    depth = treads.get((character.motion.name, motion.sole.name), 0.0)
-                    parts.append(_mark(grid, contact, film, count, depth))
-                    count += 1
-    return replace(_joined(parts, booked), surface=surface)
+            tread = treads.get((character.motion.name, motion.sole.name), 0.0)
+            for kind in sticking:
+                starts = dirty if kind.name == surface else 0.0
+                marks, of_sole = _of_sole(grid, contacts, soft[kind.name], kind, starts, tread)
+                parts[kind.name] += marks
+                booked[kind.name] += of_sole
+    if not parts:
+        return None
+    most = max(parts, key=lambda kind: booked[kind].left_behind)
+    return replace(_joined(parts[most], booked[most]), surface=most)
+
+
+def _of_sole(
+    grid: SoleGrid,
+    contacts: Sequence[_Contact],
+    soft: Sequence[Meeting],
+    kind: SurfaceRecord | Liquid,
+    dirty: float,
+    tread: float,
+) -> tuple[list[Marks], CarriedMass]:
+    """Marks of a sole of one kind, and what it has carried."""
+    carried, meetings = kind.carried, list(soft)
+    shares: dict[int, list[tuple[_Contact, Array]]] = {}
+    assert carried is not None
+    for contact in contacts:
+        if contact.wet == kind.name:
+            meetings.append(Meeting(float(contact.frames[-1])))
+            continue
+        share = share_left(contact.laid.pressure, carried, contact.slid)
+        of_zones = _by_zone(grid, share * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
+        meetings.append(meeting := Meeting(float(contact.frames[0]), of_zones))
+        shares[id(meeting)] = [(contact, share)]
+    meetings.sort(key=lambda one: one.frame)
+    giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
+    marks = []
+    for meeting, film in zip(meetings, giving, strict=True):
+        for contact, share in shares.get(id(meeting), ()):
+            if (mass := film[grid.zone] * share).any():
+                marks.append(_mark(grid, contact, mass, tread))
+    return marks, of_sole
 
 
 def _soft_meetings(
-    character: CharacterLoads, index: int, steps: Sequence[EditableStep], shed: Mapping[int, float]
+    character: CharacterLoads,
+    index: int,
+    steps: Sequence[EditableStep],
+    kind: str,
+    surface: str,
+    shed: Mapping[int, float],
 ) -> Iterator[Meeting]:
-    """A sole as it leaves the soft ground, which it does not with its last step if that goes on to the end."""
+    """A sole as it leaves soft ground of a kind, which it does not with its last step if that goes on to the end."""
     of_sole = character.motion.name, character.motion.soles[index].sole.name
+    density = surfaces.sticking(kind).density
     for step in steps:
         if step.left is None or step.is_copy or (step.left.character, step.left.sole) != of_sole:
             continue
-        if step.left.end_frame < character.motion.frames[-1]:
-            yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0))
+        if (step.left.surface or surface) == kind and step.left.end_frame < character.motion.frames[-1]:
+            yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
 
 
 def _slid(character: CharacterLoads, index: int) -> Array:
@@ -167,13 +204,7 @@ def _pieces(hard: NDArray[np.bool_], slid: Array) -> Iterator[slice]:
 
 
 def _contact(
-    character: CharacterLoads,
-    index: int,
-    grid: SoleGrid,
-    during: slice,
-    slid: Array,
-    terrain: HardOnSoft,
-    carried: CarriedFilm,
+    character: CharacterLoads, index: int, grid: SoleGrid, during: slice, slid: Array, terrain: HardOnSoft
 ) -> _Contact:
     motion = character.motion
     steps = np.arange(during.start, during.stop, max(1, (during.stop - during.start) // LOOKED_AT))
@@ -182,28 +213,31 @@ def _contact(
     poses[..., :3, 3] -= lift[:, None]  # the float or sink of the source
     force, tolerance = normal_force(character, index)[steps], LEAVE_HEIGHT * motion.leg_length
     print_ = laid(grid, poses, force, terrain, tolerance)
-    shares = share_left(print_.pressure, carried, float(slid[during.stop - 1] - slid[during.start]))
-    of_zones = _by_zone(grid, shares * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
-    frames = motion.frames[steps]
-    return _Contact(Meeting(float(frames[0]), of_zones), print_, shares, frames)
+    x, y, z = print_.position.T
+    weight = print_.pressure * grid.area
+    wet = ""
+    for liquid, floor in terrain.wet.items():
+        on_it = np.abs(floor.heights(x, y, z) - z) < SAME_LAYER
+        wet = liquid if weight[on_it].sum() > 0.5 * weight.sum() else wet
+    return _Contact(print_, float(slid[during.stop - 1] - slid[during.start]), motion.frames[steps], wet)
 
 
 def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int, tread: float) -> Marks:
-    """The mark of one contact that takes its shares of a film (4,) [kg/m²]."""
+def _mark(grid: SoleGrid, contact: _Contact, mass: Array, tread: float) -> Marks:
+    """The mark of one contact that leaves a mass at each node of the grid [kg/m²]; `_joined` numbers it."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
     return Marks(
         contact.laid.position[used],
         faces.reshape(-1, 4),
         contact.frames[contact.laid.touched[used]],
-        (film[grid.zone] * contact.shares)[used],
+        mass[used],
         grid.area[used],
         grid.sole[used],
         np.full(len(used), tread),
-        np.full(len(used), number),
+        np.zeros(len(used), np.intp),
     )
 
 
@@ -211,7 +245,8 @@ def _joined(parts: Sequence[Marks], carried: CarriedMass) -> Marks:
     first = np.cumsum([0, *(len(part.position) for part in parts)])
     none, places, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.intp)
     nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, places, none, numbers)
-    names = ("position", "birth", "mass", "area", "sole", "tread", "step")
+    names = ("position", "birth", "mass", "area", "sole", "tread")
     whole: Any = {name: np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names}
+    whole["step"] = np.repeat(np.arange(len(parts)), [len(part.position) for part in parts])
     faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
     return Marks(faces=np.concatenate([nothing.faces, *faces]), **whole, carried=carried)

@@ -17,7 +17,7 @@ from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
 from softground_addon.core.weather import weather
-from tests.blender.ground.test_hard_ground import listed, over_a_crate
+from tests.blender.ground.test_hard_ground import LOW, box, listed, over_a_crate
 from tests.blender.grounds import bake, heights
 
 HEIGHT = 0.2
@@ -186,6 +186,21 @@ def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
     before = baked[1].report["totals"]["carried_kg"]
     assert carried["brought"] > 0.0 == before["brought"]
     assert carried["left_behind"] > before["left_behind"]
+    assert bake_report.stale_reasons(scene) == ()
+
+
+def test_soles_take_up_what_wets_hard_ground_and_a_bake_without_it_is_outdated(scene):
+    options = scene.softground
+    listed(box(scene, "Path", 0.002, y=(-4.5, LOW - 0.3), bottom=-0.5))
+    options.material.surface = "sand"  # which does not stick
+    assert "carried_kg" not in bake(scene).report["totals"]
+    assert marks_object.of(options.ground) is None
+    options.hard_grounds[0].wet = "PAINT"
+    assert "The settings have changed" in bake_report.stale_reasons(scene)
+    carried = bake(scene).report["totals"]["carried_kg"]
+    obj = marks_object.of(options.ground)
+    assert carried["picked_up"] == pytest.approx(carried["left_behind"] + carried["on_soles"], abs=1e-9)
+    assert {value.value for value in obj.data.attributes["kind"].data} == {CARRIED_KINDS.index("paint")}
     assert bake_report.stale_reasons(scene) == ()
 
 
