@@ -23,8 +23,8 @@ PRESET = "Soil"
 FRAMES = 140
 PUDDLE, HALF_WIDTH, DEEP = (-1.1, 0.25), 0.45, 6e-4
 """Where the puddle is along the way, half its width and its height over the floor [m]."""
-DRIES_FASTER = 150.0
-"""So that prints are gone after some seconds."""
+DRIES_FASTER = 60.0
+"""So that prints are gone after ten seconds."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,10 @@ BIRTH, MASS, KIND, WETNESS, SOLE, STEP = "birth", "mass", "kind", "wetness", "so
 place along and across the sole and distance to its outline [m], number of the contact."""
 TREAD = "tread"
 """Depth of the grooves of the sole [m], 0 of bare feet."""
+SHARE, ZONE = "share", "zone"
+"""Share of the film on the sole that is left there, and zone of the sole: for steps that are edited."""
+NOTHING = -1.0
+"""Mass of a mark that no sole leaves as the steps are now."""
 MELTED = "melted"
 """Share of snow that has melted, 0 to 1."""
 
@@ -49,7 +53,8 @@ def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     geometry, sliders = _inputs(graph, surface)
     frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
     age = (graph.number(frame) - graph.number(graph.attribute(BIRTH))) / frame_rate
-    geometry = graph.without(geometry, graph.compare("LESS_THAN", age.socket, 0.0))
+    is_none = graph.compare("LESS_THAN", graph.attribute(MASS), 0.0)
+    geometry = graph.without(geometry, graph.either(graph.compare("LESS_THAN", age.socket, 0.0), is_none))
     passed = age * sliders["Time Scale"]
     water = graph.number(graph.attribute(MASS)) * (surface.carried.water / weather.WATER_DENSITY)
     if surface.melts:

@@ -52,9 +52,13 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
+    share : (V,) float array
+        Of the film on the sole that is left there.
+    zone : (V,) int array
+        See `film.ZONES`.
+    floors : FloorSteps
+        From which the mass follows.
     carried : CarriedMass
-    surface : str
-        What they are of.
     """
 
     position: Array
@@ -65,8 +69,93 @@ class Marks:
     sole: Array
     tread: Array
     step: NDArray[np.intp]
+    share: Array
+    zone: NDArray[np.intp]
+    floors: FloorSteps
     carried: CarriedMass = field(default_factory=CarriedMass)
-    surface: str = ""
+
+    def with_steps(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> Marks:
+        """The same marks with the mass that they have after other steps on the soft ground; see `FloorSteps.films`."""
+        films, booked = self.floors.films(steps, shed)
+        each = np.array([films[number] for number in range(len(films))]).reshape(-1, len(ZONES))
+        return replace(self, mass=each[self.step, self.zone] * self.share, carried=booked)
+
+
+@dataclass(frozen=True)
+class SoleOnFloors:
+    """The way of a sole over hard floors, whatever it carries.
+
+    Attributes
+    ----------
+    of : (str, str)
+        Character and sole.
+    areas : (4,) float array
+        Of its zones [m²].
+    last_frame : float
+        Of the shot.
+    dirty : float
+        Film as the shot starts, over the thickest.
+    meetings : sequence of Meeting
+        With hard floors, in the order of time.
+    marks : sequence of int
+        Number of the mark that each of these leaves; -1 of none.
+    """
+
+    of: tuple[str, str]
+    areas: Array
+    last_frame: float
+    dirty: float
+    meetings: tuple[Meeting, ...]
+    marks: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FloorSteps:
+    """Steps of all soles on hard floors: what they leave follows from these and the steps on soft ground.
+
+    Attributes
+    ----------
+    kind, ground : str
+        What they carry, and what the ground is made of where a step does not say.
+    soles : sequence of SoleOnFloors
+    """
+
+    kind: str
+    ground: str
+    soles: tuple[SoleOnFloors, ...]
+
+    def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
+        """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
+
+        Parameters
+        ----------
+        steps : sequence of EditableStep
+            On the soft ground, as the artist leaves them.
+        shed : mapping of int to float
+            Volume that each sheds in the air, by its number [m³].
+        """
+        carried = surfaces.sticking(self.kind).carried
+        assert carried is not None
+        films: dict[int, Array] = {}
+        booked = CarriedMass()
+        for sole in self.soles:
+            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
+            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda one: one[0].frame)
+            giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
+            films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
+            booked += of_sole
+        return films, booked
+
+    def _soft_meetings(
+        self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
+    ) -> Iterator[Meeting]:
+        """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
+        density = surfaces.sticking(self.kind).density
+        for step in steps:
+            if step.left is None or step.is_copy or (step.left.character, step.left.sole) != sole.of:
+                continue
+            if (step.left.surface or self.ground) == self.kind and step.left.end_frame < sole.last_frame:
+                yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
 
 
 @dataclass(frozen=True)
@@ -77,6 +166,18 @@ class _Contact:
     slid: float
     frames: Array
     wet: str
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """A mark, its faces, and the values of its vertices as `Marks` has them."""
+
+    number: int
+    faces: NDArray[np.intp]
+    values: dict[str, Any]
+
+
+_COLUMNS = ("position", "birth", "mass", "area", "sole", "tread", "share", "zone")
 
 
 @sliced
@@ -114,14 +215,16 @@ def marks_of(
     kinds = dict.fromkeys([surface, *(step.left.surface for step in steps if step.left and step.left.surface)])
     sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
     sticking = [kind for kind in sticking if kind.carried is not None]
-    parts: dict[str, list[Marks]] = {kind.name: [] for kind in sticking}
-    booked = dict.fromkeys(parts, CarriedMass())
+    if not sticking:
+        return None
+    laid_out: list[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]] = []
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             yield
-            soft = {kind: list(_soft_meetings(character, index, steps, kind, surface, shed)) for kind in parts}
-            dirty, hard = brought.get(character.motion.name, 0.0), character.contacts.hard
-            takes = any(soft.values()) or dirty or terrain.wet
+            of, hard = (character.motion.name, motion.sole.name), character.contacts.hard
+            dirty = brought.get(of[0], 0.0)
+            on_soft = any((step.baked.character, step.baked.sole) == of for step in steps)
+            takes = on_soft or dirty or terrain.wet
             if not takes or motion.sole.prop is not None or hard is None or not hard[:, index].any():
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
@@ -129,64 +232,44 @@ def marks_of(
             for during in _pieces(hard[:, index], slid := _slid(character, index)):
                 contacts.append(_contact(character, index, grid, during, slid, terrain))
                 yield
-            tread = treads.get((character.motion.name, motion.sole.name), 0.0)
-            for kind in sticking:
-                starts = dirty if kind.name == surface else 0.0
-                marks, of_sole = _of_sole(grid, contacts, soft[kind.name], kind, starts, tread)
-                parts[kind.name] += marks
-                booked[kind.name] += of_sole
-    if not parts:
-        return None
-    most = max(parts, key=lambda kind: booked[kind].left_behind)
-    return replace(_joined(parts[most], booked[most]), surface=most)
+            sole = SoleOnFloors(of, _by_zone(grid, grid.area), float(character.motion.frames[-1]), dirty, (), ())
+            laid_out.append((grid, contacts, sole, treads.get(of, 0.0)))
+    whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
+    return max(whole, key=lambda marks: marks.carried.left_behind, default=None)
 
 
-def _of_sole(
-    grid: SoleGrid,
-    contacts: Sequence[_Contact],
-    soft: Sequence[Meeting],
+def _of_kind(
     kind: SurfaceRecord | Liquid,
-    dirty: float,
-    tread: float,
-) -> tuple[list[Marks], CarriedMass]:
-    """Marks of a sole of one kind, and what it has carried."""
-    carried, meetings = kind.carried, list(soft)
-    shares: dict[int, list[tuple[_Contact, Array]]] = {}
-    assert carried is not None
-    for contact in contacts:
-        if contact.wet == kind.name:
-            meetings.append(Meeting(float(contact.frames[-1])))
-            continue
-        share = share_left(contact.laid.pressure, carried, contact.slid)
-        of_zones = _by_zone(grid, share * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
-        meetings.append(meeting := Meeting(float(contact.frames[0]), of_zones))
-        shares[id(meeting)] = [(contact, share)]
-    meetings.sort(key=lambda one: one.frame)
-    giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
-    marks = []
-    for meeting, film in zip(meetings, giving, strict=True):
-        for contact, share in shares.get(id(meeting), ()):
-            if (mass := film[grid.zone] * share).any():
-                marks.append(_mark(grid, contact, mass, tread))
-    return marks, of_sole
-
-
-def _soft_meetings(
-    character: CharacterLoads,
-    index: int,
+    ground: str,
+    laid_out: Sequence[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]],
     steps: Sequence[EditableStep],
-    kind: str,
-    surface: str,
     shed: Mapping[int, float],
-) -> Iterator[Meeting]:
-    """A sole as it leaves soft ground of a kind, which it does not with its last step if that goes on to the end."""
-    of_sole = character.motion.name, character.motion.soles[index].sole.name
-    density = surfaces.sticking(kind).density
-    for step in steps:
-        if step.left is None or step.is_copy or (step.left.character, step.left.sole) != of_sole:
-            continue
-        if (step.left.surface or surface) == kind and step.left.end_frame < character.motion.frames[-1]:
-            yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
+) -> Marks:
+    """All marks of one kind, of steps that are muted, too: those weigh nothing."""
+    assert kind.carried is not None
+    parts: list[_Mark] = []
+    soles = []
+    for grid, contacts, sole, tread in laid_out:
+        meetings, marks = [], []
+        for contact in sorted(contacts, key=lambda one: one.frames[0]):
+            is_wet = contact.wet == kind.name
+            share = share_left(contact.laid.pressure, kind.carried, contact.slid)
+            of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)
+            meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), of_zones))
+            marks.append(-1 if is_wet else len(parts))
+            parts += [] if is_wet else [_mark(grid, contact, share, tread, len(parts))]
+        dirty = sole.dirty if kind.name == ground else 0.0
+        soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
+    floors = FloorSteps(kind.name, ground, tuple(soles))
+    at_most, _ = floors.films([replace(step, left=step.baked) for step in steps if not step.is_copy], {})
+    parts = [
+        part for number, part in enumerate(parts) if (at_most[number][part.values["zone"]] * part.values["share"]).any()
+    ]
+    numbers = {part.number: number for number, part in enumerate(parts)}
+    floors = replace(
+        floors, soles=tuple(replace(sole, marks=tuple(numbers.get(mark, -1) for mark in sole.marks)) for sole in soles)
+    )
+    return _joined(parts, floors).with_steps(steps, shed)
 
 
 def _slid(character: CharacterLoads, index: int) -> Array:
@@ -226,27 +309,27 @@ def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, mass: Array, tread: float) -> Marks:
-    """The mark of one contact that leaves a mass at each node of the grid [kg/m²]; `_joined` numbers it."""
+def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number: int) -> _Mark:
+    """The mark of one contact that leaves a share at each node of the grid."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
-    return Marks(
-        contact.laid.position[used],
-        faces.reshape(-1, 4),
-        contact.frames[contact.laid.touched[used]],
-        mass[used],
-        grid.area[used],
-        grid.sole[used],
-        np.full(len(used), tread),
-        np.zeros(len(used), np.intp),
-    )
+    values = {
+        "position": contact.laid.position[used],
+        "birth": contact.frames[contact.laid.touched[used]],
+        "mass": np.zeros(len(used)),
+        "area": grid.area[used],
+        "sole": grid.sole[used],
+        "tread": np.full(len(used), tread),
+        "share": share[used],
+        "zone": grid.zone[used],
+    }
+    return _Mark(number, faces.reshape(-1, 4), values)
 
 
-def _joined(parts: Sequence[Marks], carried: CarriedMass) -> Marks:
-    first = np.cumsum([0, *(len(part.position) for part in parts)])
-    none, places, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.intp)
-    nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, places, none, numbers)
-    names = ("position", "birth", "mass", "area", "sole", "tread")
-    whole: Any = {name: np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names}
-    whole["step"] = np.repeat(np.arange(len(parts)), [len(part.position) for part in parts])
+def _joined(parts: Sequence[_Mark], floors: FloorSteps) -> Marks:
+    first = np.cumsum([0, *(len(part.values["mass"]) for part in parts)])
+    none, places = np.zeros(0), np.zeros((0, 3))
+    nothing = dict.fromkeys(_COLUMNS, none) | {"position": places, "sole": places, "zone": np.zeros(0, np.intp)}
+    whole: Any = {name: np.concatenate([nothing[name], *(part.values[name] for part in parts)]) for name in _COLUMNS}
     faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
-    return Marks(faces=np.concatenate([nothing.faces, *faces]), **whole, carried=carried)
+    faces = np.concatenate([np.zeros((0, 4), np.intp), *faces])
+    return Marks(faces=faces, step=np.repeat(np.arange(len(parts)), np.diff(first)), floors=floors, **whole)

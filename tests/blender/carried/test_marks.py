@@ -210,12 +210,33 @@ def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
     assert bake_report.stale_reasons(scene) == ("The settings have changed",)
 
 
-def test_marks_stay_while_steps_on_the_ground_are_edited(scene):
-    ground = scene.softground.ground
-    before = mesh_arrays.positions(marks_object.of(ground).data).tobytes()
-    editing = step_edits.editable(scene)
-    step_edits.edit(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)})
-    assert mesh_arrays.positions(marks_object.of(ground).data).tobytes() == before
+def edit(scene, edits):
+    step_edits.edit(scene, step_edits.editable(scene), edits)
+
+
+def state_of(obj):
+    return mesh_arrays.positions(obj.data), np.maximum(values(obj.data, "mass"), 0.0)
+
+
+def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(scene):
+    obj, frame = marks_object.of(scene.softground.ground), 84
+    before, count = state_of(obj), len(at(scene, frame).vertices)
+    names = [step.name for step in baked_ground.steps_of(scene.softground.ground)]
+    edit(scene, {names[0]: StepEdit(mute=True)})
+    fewer = state_of(obj)
+    assert 0.0 < fewer[1].sum() < before[1].sum()
+    carried = bake(scene).report["totals"]["carried_kg"]
+    again = state_of(marks_object.of(scene.softground.ground))
+    assert again[1] == pytest.approx(fewer[1], abs=1e-6)
+    assert again[0] == pytest.approx(fewer[0], abs=1e-6)
+    assert carried["picked_up"] == pytest.approx(sum(carried.values()) - carried["picked_up"], abs=1e-9)
+    edit(scene, {name: StepEdit(mute=True) for name in names})
+    assert not state_of(obj)[1].any()
+    assert len(at(scene, frame).vertices) == 0
+    edit(scene, {})
+    assert state_of(obj)[1] == pytest.approx(before[1], abs=1e-6)
+    assert state_of(obj)[0] == pytest.approx(before[0], abs=1e-6)
+    assert len(at(scene, frame).vertices) == count
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def test_dirty_soles_leave_marks_though_they_step_into_nothing():
     loads, footprints, _ = crossing()
     muted = range(len(footprints))
     clean, dirty = marks(muted=muted), marks(muted=muted, brought={loads.motion.name: 0.8})
-    assert not len(clean.position)
+    assert not clean.mass.any()
     assert dirty.carried.brought > 0 == dirty.carried.picked_up
     assert mass_of_steps(dirty).sum() == pytest.approx(dirty.carried.brought - dirty.carried.on_soles, abs=1e-9)
 
@@ -141,7 +141,7 @@ def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():
     whole, fewer, none = marks(), marks(muted=(0, 1)), marks(muted=range(count))
     assert fewer.carried.picked_up < whole.carried.picked_up
     assert fewer.carried.left_behind < whole.carried.left_behind
-    assert not len(none.position)
+    assert not none.mass.any()
     assert none.carried.picked_up == 0.0
 
 
@@ -150,7 +150,7 @@ def test_soles_that_step_into_a_puddle_carry_it_on_and_leave_no_mark_in_it(liqui
     puddle = slab((3.0, 4.2), (-1, 1), FLOOR)
     found = marks("sand", wet={liquid: puddle})
     film, of_steps = LIQUIDS[liquid].carried, mass_of_steps(found)
-    assert found.surface == liquid
+    assert found.floors.kind == liquid
     assert len(of_steps) >= 3
     assert (np.diff(of_steps) < 0).all()
     inside = (found.position[:, 0] > 3.0) & (found.position[:, 0] < 4.2)
@@ -164,5 +164,19 @@ def test_soles_that_step_into_a_puddle_carry_it_on_and_leave_no_mark_in_it(liqui
 
 def test_of_mud_and_a_puddle_what_is_most_is_left():
     puddle = {"water": slab((3.0, 4.2), (-1, 1), FLOOR)}
-    assert marks("mud", wet=puddle).surface == "mud"
+    assert marks("mud", wet=puddle).floors.kind == "mud"
     assert mass_of_steps(marks("mud", wet=puddle)) == pytest.approx(mass_of_steps(marks("mud")))
+
+
+def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
+    _, footprints, _ = crossing()
+    steps = steps_of(footprints, {}, {}, {})
+    whole = marks()
+    for muted in ((0,), (0, 1, 2), range(len(steps)), ()):
+        edited = [replace(step, left=None) if step.index in muted else step for step in steps]
+        found, anew = whole.with_steps(edited, {1: 1e-5}), marks(muted=muted, shed={1: 1e-5})
+        assert found.mass == pytest.approx(anew.mass, abs=1e-12)
+        carried = found.carried
+        assert carried == anew.carried
+        assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
+        assert mass_of_steps(found).sum() == pytest.approx(carried.left_behind, abs=1e-9)
