@@ -108,6 +108,20 @@ def test_marks_dry_as_weather_dries_them(scene):
     assert 0 < np.mean(wet[mass > 0]) < 1
 
 
+def test_rain_keeps_marks_wet_and_washes_them_off(scene):
+    obj = marks_object.of(scene.softground.ground)
+    before = values(at(scene, 84), "mass")
+    set_input(obj, "Drying", 0.5)
+    set_input(obj, "Rain", 20.0)
+    set_input(obj, "Time Scale", 600.0)
+    mesh = at(scene, 84)
+    fallen = 20.0 / 3600.0 * 600.0 * (84 - values(mesh, "birth")) / 24
+    assert values(mesh, "mass") == pytest.approx(before * np.exp(-0.18 * fallen), rel=1e-4)
+    assert (values(mesh, "wetness") == 1.0).all()
+    set_input(obj, "Rain", 0.0)
+    assert (values(at(scene, 84), "mass") == before).all()
+
+
 def test_they_play_without_the_add_on(scene, baked):
     script = (
         f"import bpy\nbpy.ops.wm.open_mainfile(filepath={str(baked[0])!r})\n"
