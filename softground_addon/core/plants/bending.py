@@ -163,4 +163,4 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
     kept = 1.0 - np.greater(by.above, 0.0) * (1.0 - BRUSHED)
     rising = (stays + (released - stays) * left) * np.greater(since, 0.0) * kept
     weight = np.maximum(holds, np.greater(frame, by.start) * kept)
-    return np.maximum(holds, rising) * by.reach, weight
+    return np.maximum(holds, rising) * by.reach, weight * by.reach
