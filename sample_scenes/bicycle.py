@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, radians
+from math import pi
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage
+from sample_scenes import plates, production, stage
 from sample_scenes.course import Course
 from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.core.record.footprints import recompose
@@ -20,7 +20,6 @@ SPEED = 1.6  # m/s
 MASS = 95.0  # kg, with a rider
 WHEELBASE, WHEEL, TYRE = 1.02, 0.335, 0.024  # m; radius to the ground, radius of the tyre
 WAY = ((0.0, 0.0), (1.6, 0.0), (2.8, 0.35), (4.2, 1.3))  # m
-PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)
@@ -139,19 +138,9 @@ def claims(built: Bicycle) -> list[Claim]:
     ]
 
 
-def shoot(built: Bicycle, folder: Path, samples: int) -> list[Path]:
-    """The bicycle at the end of its way, and the track behind it."""
-    scene = bpy.context.scene
-    scene.frame_set(FRAMES)
-    stage.add_sun(scene, radians(-115), radians(17))
-    ground = built.bakes["sand"].display_mesh
-    stage.add_floor(-0.15, scene.collection)
-    stage.add_tray(ground, scene.collection)
-    camera = stage.add_camera(scene, "Bicycle", lens=36.0)
-    stage.aim(camera, (0.3, -2.6, 1.5), (3.2, 0.6, 0.35))
-    path = folder / "bicycle.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: Bicycle, folder: Path, _samples: int) -> list[Path]:
+    """The track from above."""
+    return [plates.draw_plate({"": built.bakes["sand"].footprints}, folder / "bicycle.png")]
 
 
 if __name__ == "__main__":

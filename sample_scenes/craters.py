@@ -6,13 +6,13 @@ One ground, painted: 50 kg on 1 MPa in the middle of each row, tau = 0.2 s every
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, radians, sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage, terrain
+from sample_scenes import plates, production, stage, terrain
 from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.core.record.footprints import Footprint
 
@@ -23,7 +23,6 @@ DROP = 2.5  # m
 RADIUS = 0.20  # m
 SPACING = 0.75  # m from sphere to sphere
 GRAVITY = 9.81  # m/s²
-PICTURE = (896, 560)
 
 MASS, MODULUS, POISSON, TAU = 50.0, 1.0e6, 0.3, 0.2  # kg, Pa, 1, s
 ROWS: dict[str, tuple[float, ...]] = {
@@ -31,6 +30,9 @@ ROWS: dict[str, tuple[float, ...]] = {
     "modulus": (0.5e6, 1.0e6, 2.0e6),  # Pa
     "poisson": (0.0, 0.3, 0.5),
 }
+
+
+NAMES = {"mass": "{:g} kg".format, "modulus": lambda pa: f"{pa / 1e6:g} MPa", "poisson": "nu = {:g}".format}
 
 
 @dataclass(frozen=True)
@@ -149,23 +151,11 @@ def table(built: Craters) -> str:
     return "\n".join(lines)
 
 
-def shoot(built: Craters, folder: Path, samples: int) -> list[Path]:
-    """The craters from above under a low sun, the spheres taken away; prints the table."""
+def shoot(built: Craters, folder: Path, _samples: int) -> list[Path]:
+    """The craters from above; prints the table."""
     print(table(built))
-    scene = bpy.context.scene
-    scene.frame_set(scene.frame_end)
-    for sphere in built.spheres.values():
-        sphere.hide_render = True
-    stage.add_sun(scene, radians(-20), radians(20))
-    scene.view_settings.exposure = -0.4
-    ground = built.bakes["craters"].ground
-    stage.add_tray(ground, scene.collection)
-    stage.add_floor(-0.4, scene.collection)
-    camera = stage.add_camera(scene, "Above", lens=50.0)
-    stage.aim(camera, (0.0, -2.9, 3.2), (0.0, -0.06, 0.0))
-    path = folder / "craters.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+    craters = {NAMES[row](value): (built.crater(row, value),) for row, value in built.spheres}
+    return [plates.draw_plate(craters, folder / "craters.png")]
 
 
 if __name__ == "__main__":

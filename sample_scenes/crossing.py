@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage
+from sample_scenes import plates, production
 from sample_scenes.body import Body
 from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
@@ -21,7 +21,6 @@ from softground_addon.core.record.footprints import Footprint, recompose
 
 CELL_SIZE = 0.012  # m
 FRAMES = 84  # 3.5 s
-PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)
@@ -101,21 +100,9 @@ def _difference(a: HeightField, b: HeightField) -> float:
     return max(float(np.abs(a.tiles[key] - b.tiles[key]).max()) for key in a.tiles)
 
 
-def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
-    """The crossing from above, and the walkers on their way."""
-    scene = bpy.context.scene
-    scene.frame_set(scene.frame_end)
-    stage.add_sun(scene, radians(-30), radians(16))
-    scene.view_settings.exposure = -0.4
-    camera = stage.add_camera(scene, "Crossing", lens=28.0)
-    bake = built.bakes["Snow"]
-    middle = np.mean([step.position for step in bake.footprints], axis=0)
-    stage.aim(camera, middle + np.array((1.9, 3.9, 2.9)), middle + np.array((-0.2, -0.75, 0.4)))
-    low, _ = stage.bounds([bake.display_mesh])
-    stage.add_floor(low[2] - 0.02, scene.collection)
-    path = folder / "crossing.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: Crossing, folder: Path, _samples: int) -> list[Path]:
+    """Both tracks from above."""
+    return [plates.draw_plate({"": built.bakes["Snow"].footprints}, folder / "crossing.png")]
 
 
 if __name__ == "__main__":

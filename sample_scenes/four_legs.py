@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage
+from sample_scenes import plates, production
 from sample_scenes.character import create_character
 from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.four_legged import TROT, WALK, go_on_four_legs
@@ -27,7 +26,6 @@ SEQUENCE = ("foot.L", "hand.L", "foot.R", "hand.R")
 """Order of a walk: each hind paw is followed by the forepaw of its side (Hildebrand 1965)."""
 DIAGONALS = {"foot.L": "hand.R", "foot.R": "hand.L", "hand.L": "foot.R", "hand.R": "foot.L"}
 APART = 0.9  # m between their ways
-PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)
@@ -89,19 +87,11 @@ def claims(built: FourLegs) -> list[Claim]:
     return result
 
 
-def shoot(built: FourLegs, folder: Path, samples: int) -> list[Path]:
-    """Both dogs on their way."""
-    scene = bpy.context.scene
-    scene.frame_set(FRAMES)
-    stage.add_sun(scene, radians(-150), radians(20))
-    ground = built.bakes["Mud"].display_mesh
-    stage.add_floor(-0.15, scene.collection)
-    stage.add_tray(ground, scene.collection)
-    camera = stage.add_camera(scene, "Dogs", lens=40.0)
-    stage.aim(camera, (-2.9, -7.4, 2.1), (0.55, -3.75, 0.12))
-    path = folder / "four_legs.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: FourLegs, folder: Path, _samples: int) -> list[Path]:
+    """Both tracks from above."""
+    bake = built.bakes["Mud"]
+    tracks = {name: bake.of(dog.name) for name, dog in built.dogs.items()}
+    return [plates.draw_plate(tracks, folder / "four_legs.png")]
 
 
 if __name__ == "__main__":

@@ -7,13 +7,12 @@ tiny feet leaves hardly anything. Snow and sand are one mesh with two materials,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage, terrain
+from sample_scenes import plates, production, terrain
 from sample_scenes.body import Body, Foot
 from sample_scenes.character import create_character
 from sample_scenes.course import Course
@@ -33,7 +32,6 @@ FRAMES = 116
 SPACING = 0.06  # m between the vertices of the landscape; along the tracks the bake makes it finer
 LOW, HIGH = np.array((-3.4, -8.0)), np.array((4.2, 1.4))  # m
 BORDER = -3.6  # m; snow before it, sand beyond
-PICTURE = (896, 504)
 
 SAND = "sand"
 """Attribute of the ground: how much of it is sand, not snow."""
@@ -187,18 +185,10 @@ def covered(steps: tuple[Footprint, ...]) -> float:
     return float(np.isin(way, sorted(rows)).mean())
 
 
-def shoot(_built: Landscape, folder: Path, samples: int) -> list[Path]:
-    """All of it from above the border, at the end."""
-    scene = bpy.context.scene
-    scene.frame_set(scene.frame_end)
-    stage.add_sun(scene, radians(-20), radians(17))
-    scene.view_settings.exposure = -0.4
-    stage.add_floor(-0.03, scene.collection)
-    camera = stage.add_camera(scene, "Landscape", lens=40.0)
-    stage.aim(camera, (-5.6, -10.4, 4.4), (0.55, -3.2, 0.1))
-    path = folder / "landscape.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: Landscape, folder: Path, _samples: int) -> list[Path]:
+    """All tracks from above, at the end."""
+    tracks = {name: built.bakes["landscape"].of(walker.name) for name, walker in built.walkers.items()}
+    return [plates.draw_plate(tracks, folder / "landscape.png")]
 
 
 if __name__ == "__main__":

@@ -176,7 +176,7 @@ def bake(
         if more := [bone for bone in walker.more if bone not in found]:
             contact_editing.add_bone_contacts(shot.characters[-1], more)
         if walker.held:
-            contact_editing.add_object_contacts(scene, shot.characters[-1], walker.held)
+            contact_editing.add_object_contacts(scene.softground, shot.characters[-1], walker.held)
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         setting_paths.assign(shot, path, value)

@@ -218,16 +218,6 @@ def hide(armature: bpy.types.Object) -> None:
         figure.hide_render = figure[_HIDDEN] = True
 
 
-def show_raised(thing: bpy.types.Object, height: float, collection: bpy.types.Collection) -> None:
-    """A copy of a thing by a height [m] above where it is; the thing itself is left out of pictures."""
-    copy = thing.copy()
-    copy.animation_data_clear()
-    copy.location.z = thing.location.z + height
-    copy[_STILL] = True
-    collection.objects.link(copy)
-    thing.hide_render = thing[_HIDDEN] = True
-
-
 def put_back() -> None:
     """Everything as it was before the pictures: figures are seen again, their frozen copies are gone."""
     bpy.context.scene.render.filepath = "//"

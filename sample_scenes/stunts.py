@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage
+from sample_scenes import plates, production
 from sample_scenes.body import Body
 from sample_scenes.cartwheel import cartwheel
 from sample_scenes.character import copy_character, create_character
@@ -24,9 +23,8 @@ CELL_SIZE = 0.0075  # m
 FRAMES = 100
 PLACES = {"dance": (-1.1, 1.0), "kick": (1.1, 1.3), "cartwheel": (-1.6, -0.9)}  # m
 SHOWN = {"dance": 62, "kick": 28, "cartwheel": 31}
-"""Frames of the picture: a step aside, the kick, upside down."""
+"""Frames of a step aside, the kick, and upside down."""
 HANDS = ("hand.L", "hand.R")
-PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)
@@ -106,21 +104,10 @@ def _vertical(loads: CharacterLoads) -> np.ndarray:
     return forces
 
 
-def shoot(built: Stunts, folder: Path, samples: int) -> list[Path]:
-    """All three in the act, and their prints."""
-    scene = bpy.context.scene
-    for name, performer in built.performers.items():
-        stage.freeze(performer, [SHOWN[name]], scene.collection)
-    scene.frame_set(FRAMES)
-    stage.add_sun(scene, radians(150), radians(24))
-    scene.view_settings.exposure = -0.3
-    stage.add_floor(-0.1, scene.collection)
-    stage.add_tray(built.bakes["sand"].display_mesh, scene.collection)
-    camera = stage.add_camera(scene, "Stunts", lens=38.0)
-    stage.aim(camera, (3.0, -5.2, 2.4), (0.0, 0.15, 0.55))
-    path = folder / "stunts.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: Stunts, folder: Path, _samples: int) -> list[Path]:
+    """The prints of all three from above."""
+    tracks = {name: built.bakes["sand"].of(performer.name) for name, performer in built.performers.items()}
+    return [plates.draw_plate(tracks, folder / "stunts.png")]
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage, terrain
+from sample_scenes import plates, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.cane import create_cane, with_cane
 from sample_scenes.character import copy_character, create_character
@@ -43,11 +43,6 @@ PLACES = {
     "faller": (-1.9, -1.3),
 }
 """Where each starts [m]; walker and sled go toward -y, who falls backward falls toward +y."""
-FALLING = 24
-"""Frame in which the one who falls is shown in the picture."""
-ABOVE = 0.45
-"""Height at which crate and ball are shown above their prints in the picture [m]."""
-PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)
@@ -178,21 +173,9 @@ def _mean_depth(steps: list[Footprint]) -> float:
     return float(np.mean([step.compressed_m3 / step.area_m2 for step in steps]))
 
 
-def shoot(built: Things, folder: Path, samples: int) -> list[Path]:
-    """All of them at the end; what falls is shown on the way down, over the print that it makes."""
-    scene = bpy.context.scene
-    stage.freeze(built.things["faller"], [FALLING], scene.collection)
-    scene.frame_set(FRAMES)
-    for name in ("crate", "ball"):
-        stage.show_raised(built.things[name], ABOVE, scene.collection)
-    stage.add_sun(scene, radians(-25), radians(16))
-    scene.view_settings.exposure = -0.5
-    stage.add_floor(-0.05, scene.collection)
-    camera = stage.add_camera(scene, "Things", lens=40.0)
-    stage.aim(camera, (-3.6, -5.2, 3.0), (-0.3, -0.2, 0.35))
-    path = folder / "things.jpg"
-    stage.render(scene, camera, path, PICTURE, samples)
-    return [path]
+def shoot(built: Things, folder: Path, _samples: int) -> list[Path]:
+    """All prints from above."""
+    return [plates.draw_plate({name: built.prints(name) for name in built.things}, folder / "things.png")]
 
 
 if __name__ == "__main__":

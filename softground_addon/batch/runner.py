@@ -96,7 +96,6 @@ class Outcome:
 
     Attributes
     ----------
-    shot : BatchShot
     status : str
         'done', 'skipped' (it was done already), 'refused' (bad input), 'failed' (a check), 'crashed', or 'interrupted'.
     attempts : int
@@ -123,8 +122,6 @@ class Step:
 
     Attributes
     ----------
-    shot : BatchShot
-    stage : str
     fraction : float
         Of the whole bake, 0 to 1.
     seconds_left : float

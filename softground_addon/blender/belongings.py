@@ -39,11 +39,11 @@ class Belonging:
         """The ground whose bake made it."""
         return obj.get(self.of_object)
 
-    def kept(self, ground: bpy.types.Object, *, wanted: bool) -> bpy.types.Object | None:
+    def remaining(self, ground: bpy.types.Object, *, wanted: bool) -> bpy.types.Object | None:
         """The object that a new bake fills, if it wants one and there is one; others that the ground had are gone."""
-        left = [obj for obj in bpy.data.objects if self._is_left_for(ground, obj)]
-        older = (self.of(ground) or next(iter(left), None)) if wanted else None
-        for owner in {ground, *map(self.owner_of, left)}:
+        orphans = [obj for obj in bpy.data.objects if self._is_left_for(ground, obj)]
+        older = (self.of(ground) or next(iter(orphans), None)) if wanted else None
+        for owner in {ground, *map(self.owner_of, orphans)}:
             if owner.get(self.of_ground) != older:
                 self.remove(owner)
         return older

@@ -45,13 +45,13 @@ def loaded(path: Path) -> presets.Preset:
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
     """The presets of a folder by name, and what is wrong with the files that are none."""
-    found, broken = [], []
+    entries, broken = [], []
     for path in sorted(folder.glob("*.json")):
         try:
-            found.append((path, loaded(path)))
+            entries.append((path, loaded(path)))
         except InputError as error:
             broken.append(str(error))
-    return sorted(found, key=lambda entry: entry[1].name.casefold()), broken
+    return sorted(entries, key=lambda entry: entry[1].name.casefold()), broken
 
 
 def named(name: str) -> presets.Preset:
@@ -98,7 +98,6 @@ def regions_of(ground: bpy.types.Object, length_scale: float = 1.0) -> tuple[Reg
 
     Parameters
     ----------
-    ground : bpy.types.Object
     length_scale : float
         Of the rims, for small soles.
     """
@@ -136,8 +135,8 @@ def check(ground: bpy.types.Object) -> None:
 
 def of_faces(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     """Number of the slot whose preset counts on each face, (P,)."""
-    own, other = (_integers(mesh, name) for name in ("material_index", ATTRIBUTE))
-    slots = np.zeros(len(mesh.polygons), np.int32) if own is None else np.maximum(own, 0)
+    slot, other = (_integers(mesh, name) for name in ("material_index", ATTRIBUTE))
+    slots = np.zeros(len(mesh.polygons), np.int32) if slot is None else np.maximum(slot, 0)
     return slots if other is None else np.where(other < 0, slots, other)
 
 

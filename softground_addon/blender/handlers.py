@@ -9,8 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import session, translation, tread_images
-from .baking import shot_prints
+from . import kept, session, translation, tread_images
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -49,9 +48,9 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
-        _follow_deletion(scene)
+        _follow_deletion(scene.softground.ground)
         if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
-            _follow_weather_keys(scene)
+            _follow_weather_keys(scene.softground.ground)
             for copy in [update.id.original for update in depsgraph.updates if update.is_updated_geometry]:
                 if isinstance(copy, bpy.types.Object):
                     weather_keys.follow(copy)
@@ -67,17 +66,16 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         _later(compare_prediction)
 
 
-def _follow_deletion(scene: Any) -> None:
-    ground = scene.softground.ground
+def _follow_deletion(ground: bpy.types.Object | None) -> None:
     if ground is not None and not live.is_on():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
             belongs.follow(ground, is_deleted=is_deleted)
 
 
-def _follow_weather_keys(scene: Any) -> None:
-    if scene.softground.ground is not None:
-        weather_keys.follow(baked_ground.display_mesh_of(scene.softground.ground))
+def _follow_weather_keys(ground: bpy.types.Object | None) -> None:
+    if ground is not None:
+        weather_keys.follow(baked_ground.display_mesh_of(ground))
 
 
 def compare_prediction() -> float | None:
@@ -101,7 +99,7 @@ def begin_render(scene: Any = None, *_: Any) -> None:
     """Live mode stands still during renders, and weather has all keys."""
     live.rendering(True)
     if scene is not None:
-        _follow_weather_keys(scene)
+        _follow_weather_keys(scene.softground.ground)
 
 
 @persistent
@@ -123,8 +121,8 @@ def after_undo(*_: Any) -> None:
     tread_images.forget()
     analysis.look_again()
     live.after_undo()
-    _follow_deletion(bpy.context.scene)
-    _follow_weather_keys(bpy.context.scene)
+    _follow_deletion(bpy.context.scene.softground.ground)
+    _follow_weather_keys(bpy.context.scene.softground.ground)
 
 
 @persistent
@@ -137,7 +135,7 @@ def before_load(*_: Any) -> None:
         live.forget()
     analysis.forget()
     tread_images.forget()
-    shot_prints.forget()
+    kept.forget()
 
 
 @persistent

@@ -12,7 +12,7 @@ from ..core.numerics.slices import Slices
 Result = TypeVar("Result")
 State = TypeVar("State")
 
-STAGES = {"sample": 6, "simulate": 3, "write": 1}
+STAGES = {"sample": 2, "simulate": 5, "write": 3}
 """Stages in their order, and the share of the whole time that each takes about, in tenths."""
 
 
@@ -81,7 +81,6 @@ def counted(
         None where as many are done as before.
     stage : str
         One of `STAGES`.
-    count : int
     part, parts : int
         Which of several equal parts the work is.
     share : float

@@ -10,9 +10,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.numerics.arrays import Indices
 from ..core.numerics.slices import Slices, sliced
-
-Indices = NDArray[np.intp]
 
 AT_ONCE = 1 << 17
 """Faces that are looked at together: a hundredth of a second."""
@@ -55,7 +54,6 @@ def add_faces(
 
     Parameters
     ----------
-    mesh : bpy.types.Mesh
     corner_vertex : (L,) int array
         Vertex of each corner.
     face_start : (P,) int array

@@ -25,7 +25,6 @@ def build(tree: Any, fill: Callable[[NodeGraph], None]) -> None:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     fill : callable
         Makes the nodes of a graph, and finishes it.
     """
@@ -41,7 +40,6 @@ class NodeGraph:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     known : bool
         Whether it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
     """
@@ -386,8 +384,8 @@ _FUNCTIONS: Mapping[np.ufunc, Callable[..., Number]] = {
     np.maximum: Number.at_least,
     np.greater: Number.above,
     np.exp: Number.exp,
-    np.expm1: lambda one: one.exp() - 1.0,
-    np.log1p: lambda one: (one + 1.0).log(),
+    np.expm1: lambda number: number.exp() - 1.0,
+    np.log1p: lambda number: (number + 1.0).log(),
     np.sqrt: Number.root,
     np.arccos: Number.arccos,
 }

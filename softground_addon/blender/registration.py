@@ -135,7 +135,7 @@ def register() -> None:
 def _follow_look(scene: bpy.types.Scene) -> None:
     """Show another look on a scene's ground: what was read of its shot still holds."""
     with analysis.own_changes(scene):
-        look.follow(scene)
+        look.follow(scene.softground)
 
 
 def unregister() -> None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
+from ..core.ground.heightfield import Terrain
+from ..core.record.footprints import Footprint
 from .state import state
 from .translation import CONTEXT
 
@@ -72,12 +75,39 @@ def show_bake(progress: float, status: str) -> None:
     """Let the panel say how far the bake is, 0 to 1, and what it is doing; nothing else is drawn."""
     state.is_baking, state.progress, state.status = True, progress, status
     redraw()
+    if state.pressing and len(state.pressing.footprints) > len(state.pressing.shapes):
+        redraw(region_type="WINDOW")
+
+
+@dataclass
+class Pressing:
+    """Prints that a bake has pressed so far.
+
+    Attributes
+    ----------
+    terrain : Terrain
+        The undisturbed ground.
+    footprints : list of Footprint
+    shapes : list
+        What the viewport draws of them, of as many as it was drawn with.
+    """
+
+    terrain: Terrain
+    footprints: list[Footprint] = field(default_factory=list)
+    shapes: list[Any] = field(default_factory=list)
+
+
+def show_pressing(terrain: Terrain) -> list[Footprint] | None:
+    """The list whose prints the viewport shows until the bake of the moment ends; None where nobody looks on."""
+    state.pressing = Pressing(terrain) if state.is_baking else None
+    return state.pressing and state.pressing.footprints
 
 
 def show_no_bake() -> None:
     """Let the panel show that no bake runs."""
-    state.is_baking, state.progress, state.status = False, 0.0, ""
+    state.is_baking, state.progress, state.status, state.pressing = False, 0.0, "", None
     redraw()
+    redraw(region_type="WINDOW")
 
 
 def show_preview(is_shown: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, cast
 
 import bpy
@@ -26,6 +27,9 @@ MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
 ADD_ON = __package__.rpartition(".")[0].removesuffix(".softground_addon")
 """The name by which Blender knows the add-on, which as an extension has `softground_addon` within it."""
+
+Objects = Iterable[bpy.types.Object]
+"""Objects among which some are sought, more than once: those of a scene."""
 
 STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
@@ -65,10 +69,10 @@ def _wet_grounds(options: Any) -> tuple[str, ...]:
     return wet if any(wet) else ()
 
 
-def forget_deleted_ground(scene: bpy.types.Scene) -> None:
+def forget_deleted_ground(options: Any) -> None:
     """Take a ground that was deleted out of the settings."""
-    if scene.softground.ground is not None and not exists(scene.softground.ground):
-        scene.softground.ground = None
+    if options.ground is not None and not exists(options.ground):
+        options.ground = None
 
 
 def typed(value: float) -> float:
@@ -104,7 +108,6 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     speed : float
         Of that which the scene has without this, however often it is asked for.
     """
@@ -119,17 +122,13 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
     options.slowed_time = (render.frame_map_old, render.frame_map_new)
 
 
-def gravity_of(scene: bpy.types.Scene) -> float:
-    """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
-    return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
-
-
 def units_of(scene: bpy.types.Scene) -> SceneUnits:
-    """Frames and lengths of a scene, as they are now."""
+    """Frames, lengths and gravity of a scene, as they are now; the Earth's gravity where it is switched off."""
+    pull = float(scene.gravity.length) if scene.use_gravity else 0.0
     return SceneUnits(
         frame_rate=frame_rate_of(scene),
         time_stretch=time_stretch_of(scene),
-        gravity_m_s2=typed(gravity_of(scene)),
+        gravity_m_s2=typed(pull if pull > 0 else STANDARD_GRAVITY),
         unit_scale_m=typed(scene.unit_settings.scale_length),
     )
 
@@ -145,7 +144,6 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     grounded : bool
         As if Grounding were on.
     """

@@ -18,9 +18,10 @@ class State:
     is_baking, progress, status, is_previewing, also_chosen
         What the panel shows of a bake; see `session`. Writing a property has Blender draw the whole window anew, scene
         and all, which takes longer than many a step of a bake; this does not.
+    pressing : session.Pressing or None
+        Prints of the bake that goes on in a window.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
-    live : LiveMode or None
     jobs : list of ModalJob
         Those that run in a window.
     hooks : dict
@@ -32,8 +33,8 @@ class State:
         Settings that were taken apart last, and their parts: panels and overlay ask for the same at each drawing.
     depths : dict
         Predicted depths, by identity of an analysis' contacts; emptied with it.
-    told : dict
-        Depth that each scene was told last [m].
+    shown_depths : dict
+        Depth that was shown last for each scene [m].
     aims : dict
         Depth that was typed in each scene.
     predicting : list of jobs
@@ -58,8 +59,8 @@ class State:
     existing : dict
         Number of users of each object when it was last looked for in the collections, and True if it was in one. Going
         through the collections takes too long to be done in `draw`; who leaves one has a user less.
-    prints : tuple or None
-        What the last bake left, after a hash of all that it follows from; see `baking.shot_prints`.
+    kept : dict
+        Results by name, after a hash of all that they follow from and before their size; see `kept`.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
     catalogues : dict
@@ -70,6 +71,7 @@ class State:
     progress: float = 0.0
     status: str = ""
     is_previewing: bool = False
+    pressing: Any = None
     also_chosen: tuple[str, ...] = ()
     picking: bool = False
     under: str = ""
@@ -81,7 +83,7 @@ class State:
     analyses: dict[int, Any] = field(default_factory=dict)
     parted: Any = None
     depths: dict[Any, float] = field(default_factory=dict)
-    told: dict[int, float] = field(default_factory=dict)
+    shown_depths: dict[int, float] = field(default_factory=dict)
     aims: dict[int, Any] = field(default_factory=dict)
     predicting: list[Any] = field(default_factory=list)
     seen: dict[int, Any] = field(default_factory=dict)
@@ -93,7 +95,7 @@ class State:
     preset_choices: list[tuple[str, str, str]] = field(default_factory=list)
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
-    prints: tuple[str, Any] | None = None
+    kept: dict[str, tuple[str, Any, int]] = field(default_factory=dict)
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
     catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 

@@ -28,8 +28,8 @@ _OWNER = object()
 
 def translated(text: str, /, **values: Any) -> str:
     """A text in the language of the interface, with values in the place of its `{names}`."""
-    own = str(bpy.app.translations.pgettext_iface(text, CONTEXT))
-    return own.format(**values) if values else own
+    ours = str(bpy.app.translations.pgettext_iface(text, CONTEXT))
+    return ours.format(**values) if values else ours
 
 
 def catalogue(language: str) -> dict[str, str]:
@@ -45,7 +45,9 @@ def follow() -> None:
         return
     if state.catalogues:
         bpy.app.translations.unregister(_MODULE)
-    state.catalogues[language] = {(context, text): own for text, own in texts.items() for context in _CONTEXTS}
+    state.catalogues[language] = {
+        (context, text): translation for text, translation in texts.items() for context in _CONTEXTS
+    }
     catalogues: Any = state.catalogues
     bpy.app.translations.register(_MODULE, catalogues)
 

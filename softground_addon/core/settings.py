@@ -13,7 +13,6 @@ from enum import IntEnum
 from typing import Any
 
 from .ground.camera_view import CameraView
-from .ground.display_spacing import spacing_of
 from .ground.material import UNSAID, GroundMaterial, Pressure
 from .ground.regions import GroundKind, numbered
 from .loads.cell_limits import Fineness
@@ -67,13 +66,11 @@ class CharacterSettings:
         None for props without a rig, and for bodies.
     name : str
         What the user calls it.
-    mass_kg : float
     skin_mass_kg, size_m : float
         Mass by the volume of its skin and the size of its rig, both when it was added; 0 where unknown.
     force_model : 'WHOLE_BODY' or 'IMPULSE'
     joints : mapping of str to (str, str)
         Canonical joint to a bone and its end, "head" or "tail".
-    soles : tuple of SoleSource
     holds : tuple of FootHold
         How Clean Feet holds single contacts.
     body : ObjectName or None
@@ -102,10 +99,8 @@ class RegionSettings:
 
     Attributes
     ----------
-    slot : int
     preset : str
         Its file name, or 'none' of a hard floor.
-    surface : str
     material : GroundMaterial or None
         None of a hard floor, and of a preset that is not there.
     """
@@ -139,24 +134,19 @@ class BakeSettings(SceneUnits):
         Where the shot is.
     ground : ObjectName or None
         None where one is to be made.
-    characters : tuple of CharacterSettings
     preset, surface : str
         Preset that was loaded last, and the render material of a ground that is made.
-    material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
     painted : (str, str, str)
         What stiffness, layer depth and rim are painted with.
-    cell_size_m : float
     frames : (int, int)
         First and last of the scene.
-    response : ResponseOptions or None
     sink_feet : bool
         Whether feet are let down where a rig can take it, and are left as they are where not.
     output : 'BOTH', 'PRINTS' or 'RESPONSE'
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
     shape_keys, dense_shape_keys : bool
         Whether they are kept, and also where the ground is dense.
-    tread_m : float
     tread_pattern : str
         One of `relief.tread.PATTERNS`, 'IMAGE' or 'SHOES'.
     tread_image : str
@@ -170,7 +160,6 @@ class BakeSettings(SceneUnits):
         The look whose relief is shown; empty where none is.
     margin_m : float
         How far a ground that is made reaches beyond the walk.
-    keep_forces : bool
     longest_bake_s : float
         A bake that would take longer is refused.
     debris : bool
@@ -233,7 +222,7 @@ class BakeSettings(SceneUnits):
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
-        return spacing_of(self.cell_size_m, self.relief)
+        return self.fineness.spacing
 
     @property
     def kinds(self) -> tuple[tuple[GroundKind, ...], dict[int, float]]:
@@ -243,8 +232,12 @@ class BakeSettings(SceneUnits):
     @property
     def carves(self) -> bool:
         """True if bodies may carve the ground: their feet are let down into it, and both are shown."""
-        sinks = self.response is not None and self.response.grounding is not None
-        return self.carve and self.output == "BOTH" and sinks
+        return self.carve and self.output == "BOTH" and self.sinks
+
+    @property
+    def sinks(self) -> bool:
+        """True if feet are let down into their prints."""
+        return self.response is not None and self.response.grounding is not None
 
     @property
     def fineness(self) -> Fineness:

@@ -190,7 +190,7 @@ def test_a_uniform_grid_plays_near_the_bare_frame_and_faster_than_dynamic_paint(
     rows = in_turns(contestants)
     if count == 512:
         alone(baked)
-        exports.export_point_cache(scene, baked, tmp_path / "ground.pc2", 1, FRAMES)
+        exports.export_point_cache(baked, tmp_path / "ground.pc2", 1, FRAMES)
         point_caches.play(baked, tmp_path / "ground.pc2", 1)
         rows["Mesh Cache (PC2)"] = cost(scene, baked)
     bare_frame = rows["bare"].frame

@@ -6,7 +6,6 @@ import pickle
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -79,14 +78,15 @@ def reset(blend: str, told: str) -> None:
 def _editable(blend: str) -> Iterator[Any]:
     """The scene of a file, its bake to be edited, and what changes the edits."""
     import softground_addon
+    from softground_addon.blender import jobs
     from softground_addon.blender.baking import step_edits
 
     softground_addon.register()
     try:
         bpy.ops.wm.open_mainfile(filepath=blend)
         scene = bpy.context.scene
-        bake = step_edits.editable(scene)
-        yield scene, bake, partial(step_edits.edit, scene, bake)
+        bake = jobs.run(step_edits.reading(scene))
+        yield scene, bake, lambda edits: jobs.run(step_edits.editing(scene, bake, edits))
     finally:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         softground_addon.unregister()

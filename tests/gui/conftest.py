@@ -41,6 +41,7 @@ WINDOWS = {
     "buttons": (1100, 760),
     "live_answers": (1100, 760),
     "first_minutes": (1100, 760),
+    "first_prints": (880, 600),
     "filmed": (880, 600),
 }
 """Width and height of the window of stories that do not want all of the screen [px]: a small one is drawn sooner; that

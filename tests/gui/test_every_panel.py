@@ -1,4 +1,4 @@
-"""Pictures of the panels below Advanced, for the docs."""
+"""The panels below Advanced, drawn by a real Blender."""
 
 import pytest
 
@@ -10,7 +10,7 @@ def facts(tell):
     return tell("every_panel")
 
 
-def test_each_panel_has_its_picture(facts):
+def test_each_panel_is_drawn(facts):
     assert len(facts["panels"]) == 13
 
 

@@ -243,6 +243,21 @@ def test_no_ridge_runs_along_the_edge_of_a_print(relief, ensure_material, surfac
     assert edge < max(open_ground, print_floor) + 0.0008
 
 
+@pytest.mark.parametrize(("tilt", "least", "most"), [(0, 0.03, 0.2), (70, 0.0, 0.015)], ids=["floor", "wall"])
+def test_no_border_of_what_is_pressed_crosses_a_wall_of_snow(spot, ensure_material, tilt, least, most):
+    """Relief sets walls beside where the sole pressed: two tones would meet half-way down."""
+    ground, seen = spot
+    ground.rotation_euler.x = np.radians(tilt)
+    material = ensure_material("snow")
+    ground.data.materials.append(material)
+    tree, shown = material.node_tree, material.node_tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(principled(material).inputs["Base Color"].links[0].from_socket, shown.inputs["Color"])
+    tree.links.new(shown.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    ground.users_scene[0].view_settings.view_transform = "Raw"
+    across = seen()[20:28].mean(axis=(0, 2))
+    assert least <= np.abs(across[4:20].mean() - across[-20:-4].mean()) < most
+
+
 def test_glints_of_snow_mirror_the_sky(spot, ensure_material):
     """At a grazing angle, EEVEE draws a facet that mirrors the ground or looks away as a dark dot."""
     ground, seen = spot

@@ -76,7 +76,6 @@ def put_layer(
     ----------
     armature : bpy.types.Object
         Local or overridden.
-    kind : LayerKind
     curves : sequence of LayerCurve
         Sorted by bone: the change of each bone in its own axes, or of root motion in the world's. Those that are not of
         a bone are of the armature as an object.

@@ -8,11 +8,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ..compat import new_channels, new_curve, set_slot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,6 @@ class LayerCurve:
     ----------
     path : str
         Data path from the object.
-    index : int
     group : str
         Name under which the user sees the channel: the bone.
     frames, values : (K,) float arrays

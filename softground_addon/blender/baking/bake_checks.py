@@ -7,21 +7,18 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks.self_check import no_motion
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings
 from .. import settings
 from ..ground import ground_surface
 from ..rigs.frame_ranges import holds_a_pose
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 COARSEST_SPACING = 0.25
 """Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""
@@ -47,7 +44,7 @@ def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> No
 
 @dataclass(frozen=True)
 class Coverage:
-    """How densely the ground's vertices lie under the prints.
+    """Density of the ground's vertices under the prints.
 
     Attributes
     ----------
@@ -70,7 +67,7 @@ class Coverage:
 
 @sliced
 def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: float) -> Slices[Coverage]:
-    """How densely vertices (V, 3), of which those in `index` are moved, lie where the ground is, or will be, printed.
+    """Density of vertices (V, 3), of which those in `index` are moved, where the ground is, or will be, printed.
 
     `printed` are the `cell_keys` of those cells, ascending, `cell_size` is in [m].
     """

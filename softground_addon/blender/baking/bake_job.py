@@ -15,7 +15,6 @@ from functools import partial
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings
@@ -49,8 +48,6 @@ from .publish import Published, at_the_end, publish, sign
 from .scene_findings import scene_findings
 from .shot_prints import shot_prints
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class BakeResult:
@@ -60,7 +57,6 @@ class BakeResult:
     ----------
     report : dict
         For JSON (see `core.files.report`).
-    footprints : tuple of Footprint
     """
 
     report: dict[str, object]
@@ -80,7 +76,6 @@ def bake(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     write : bool
         False computes and reports only, and changes nothing.
     wanted : BakeSettings, optional
@@ -96,12 +91,12 @@ def bake(
         If the result fails a check.
     """
     asked = wanted or settings_of(scene)
-    wanted, refused = response_job.without_sinking(scene, asked)
+    wanted, refused = response_job.without_sinking(scene.view_layers[0], asked)
     started = time.perf_counter()
     shot, said = yield from _read(scene, wanted, write=write)
     surface, factors = shot.surface, shot.surface.factors if shot.surface else None
-    edits = step_soles.edits_with_soles(scene, wanted, edits)
-    movers = staleness.of_movers(scene, wanted) | staleness.of_soles(scene, mesh_soles(edits))
+    edits = step_soles.edits_with_soles(scene.objects, wanted, edits)
+    movers = staleness.of_movers(scene.objects, wanted) | staleness.of_soles(scene.objects, mesh_soles(edits))
     ground = ground_of(wanted, shot)
     shot_hash = yield from meanwhile(
         Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
@@ -129,12 +124,12 @@ def bake(
         inputs=inputs,
         input_hash=input_hash,
         steps=left.steps,
-        carves=left.carves,
+        carves=left.laid_carves,
         edits=left.edits,
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, left.steps),
+        events=as_edited(happened, left.steps, left.laid_carves),
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
@@ -149,7 +144,7 @@ def bake(
         findings += of_ground
         marks_object.put(published.ground, marks, surface=marks.floors.kind if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
-        response_job.put_layers(scene, wanted, layers)
+        response_job.put_layers(scene.softground, wanted, layers)
     finished = time.perf_counter()
     result = build_report(
         timings={
@@ -173,7 +168,10 @@ def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[t
     shot = yield from read_shot(scene, wanted)
     if write:
         check_motion(wanted, shot.motions)
-    skins = [*bake_report.hidden_skins(scene, wanted, shot.motions), *bake_report.shapes_left_out(scene, wanted)]
+    skins = [
+        *bake_report.hidden_skins(scene.objects, wanted, shot.motions),
+        *bake_report.shapes_left_out(scene.objects, wanted),
+    ]
     return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
 
 
@@ -189,8 +187,6 @@ def write_prints(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    wanted : BakeSettings
     shot : Shot
         Of its ground; the motions are not needed.
     left : BakeRecord
@@ -204,8 +200,8 @@ def write_prints(
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(left.shaping, **at_the_end(wanted))
-        pressed = yield from meanwhile(Progress("write", 0.1), pressing)
-        yield Progress("write", 0.1)
+        pressed = yield from meanwhile(Progress("write", 0.05), pressing)
+        yield Progress("write", 0.05)
         trail = pressed.trail(trail_detail.FLOOR)
         del pressed
         findings: list[Finding] = []
@@ -228,8 +224,8 @@ def _created(
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
     creating = created_ground.created(drafts, wanted, plan)
-    name, layout = yield from meanwhile(Progress("write", 0.2), creating)
-    yield Progress("write", 0.3)
+    name, layout = yield from meanwhile(Progress("write", 0.1), creating)
+    yield Progress("write", 0.1)
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 
@@ -259,9 +255,9 @@ def _given(
     name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
-        Progress("write", 0.2), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.1), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
-    cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
+    cover = yield from meanwhile(Progress("write", 0.1), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
     too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
@@ -269,16 +265,16 @@ def _given(
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    coarse = yield from meanwhile(Progress("write", 0.2), trail_detail.surface_of.slices(ground, unit_scale))
+    coarse = yield from meanwhile(Progress("write", 0.1), trail_detail.surface_of.slices(ground, unit_scale))
     refinement = yield from meanwhile(
-        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
+        Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
     drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
-    drafted_name = yield from meanwhile(Progress("write", 0.4), drafting)
+    drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
-        Progress("write", 0.4), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
+        Progress("write", 0.15), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

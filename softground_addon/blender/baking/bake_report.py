@@ -45,7 +45,7 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
     ]
 
 
-def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> list[Finding]:
+def hidden_skins(objects: settings.Objects, wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> list[Finding]:
     """Feet of which a mesh is there that is not rendered, so that they print with a sole of average shape."""
     findings = []
     for character, motion in zip(wanted.characters, motions, strict=True):
@@ -64,12 +64,12 @@ def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence
                 "is hidden from renders.",
                 "Show it in renders and bake again, or leave it if those feet fit.",
             )
-            for body in hidden_on(scene, armature, bones)[:1]
+            for body in hidden_on(objects, armature, bones)[:1]
         ]
     return findings
 
 
-def shapes_left_out(scene: bpy.types.Scene, wanted: BakeSettings) -> list[Finding]:
+def shapes_left_out(objects: settings.Objects, wanted: BakeSettings) -> list[Finding]:
     """What shapes the skin of the feet and was not read."""
     findings = []
     for character in wanted.characters:
@@ -83,7 +83,7 @@ def shapes_left_out(scene: bpy.types.Scene, wanted: BakeSettings) -> list[Findin
                 f"The skin of '{body}' was read without {' and '.join(causes)}.",
                 "Check that its feet lie in their prints; if not, apply it or switch it off.",
             )
-            for body, causes in left_out_on(scene, settings.found(character.armature), bones).items()
+            for body, causes in left_out_on(objects, settings.found(character.armature), bones).items()
         ]
     return findings
 
@@ -109,4 +109,5 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
 
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
-    return staleness.reasons(scene, weather.felt(settings.snapshot(scene)))
+    wanted = weather.felt(settings.snapshot(scene))
+    return staleness.reasons(scene.softground.ground, scene.objects, wanted)

@@ -47,7 +47,6 @@ class CleanFeet:
     ----------
     feet : dict
         "before" and "after": by character "slide", "float" and "penetration", each "p95" and "max" [mm].
-    warnings : tuple of str
     """
 
     feet: Faults
@@ -93,7 +92,7 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
     cleaned, feet, missed = yield from _cleaned(wanted, shot, loads)
     layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)
-    response_job.put_layers(scene, wanted, layers, LayerKind.CLEAN_FEET)
+    response_job.put_layers(scene.softground, wanted, layers, LayerKind.CLEAN_FEET)
     yield Progress("write", 1.0)
     return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
 
@@ -133,8 +132,8 @@ def _cleaned(
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain, stands))
             feet[when][motion.name] = _statistics(faults)
         made = yield from meanwhile(now, gaps.slices(motion, touching, floor, posed_rim))
-        left = yield from meanwhile(now, gaps.slices(after, touching, floor, posed_rim))
-        responses.append(CharacterResponse(motion, response, made, left, 0.0))
+        remaining = yield from meanwhile(now, gaps.slices(after, touching, floor, posed_rim))
+        responses.append(CharacterResponse(motion, response, made, remaining, 0.0))
     return responses, feet, missed
 
 

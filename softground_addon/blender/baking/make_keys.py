@@ -7,9 +7,9 @@ from math import ceil, floor
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
 from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import axis_angles, euler_angles, quaternions, without_leaps
 from ...core.numerics.rigid import unit
@@ -29,8 +29,6 @@ from ..sampling.sampling_scene import object_named, sampling_scene, still_there
 from ..sampling.temporary import handlers_silent
 from ..translation import translated
 from . import bake_report
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -107,9 +105,9 @@ def _note_movers(scene: bpy.types.Scene) -> None:
     if ground is None or not baked_ground.is_baked(ground):
         return
     wanted = settings_of(scene)
-    soles = staleness.of_soles(scene, mesh_soles(baked_ground.edits_of(ground)))
+    soles = staleness.of_soles(scene.objects, mesh_soles(baked_ground.edits_of(ground)))
     staleness.store_again(
-        ground, staleness.stamp_of(ground), wanted.painted, staleness.of_movers(scene, wanted) | soles
+        ground, staleness.stamp_of(ground), wanted.painted, staleness.of_movers(scene.objects, wanted) | soles
     )
 
 

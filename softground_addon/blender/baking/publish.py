@@ -105,21 +105,19 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
 
     Parameters
     ----------
-    left : BakeRecord
     debris : Debris or None
         What its steps throw, from `with_debris`.
     place : Place
         Where it goes.
-    made_with : BakeSettings
     """
     footprints = left.shaping
-    stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
+    stored = yield from meanwhile(Progress("write", 0.2), record.dump.slices(left))
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)
-    sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **moment))
+    sample = yield from meanwhile(Progress("write", 0.25), sample_at.slices(footprints, x, y, **moment))
     sigma, inputs = made_with.material.blur_sigma, made_with.inputs()
     relief_of = relief_at.slices(footprints, x, y, inputs, blur_sigma=sigma)
-    relief = yield from meanwhile(Progress("write", 0.65), relief_of)
+    relief = yield from meanwhile(Progress("write", 0.3), relief_of)
     if relief:
         sample = sample.with_relief(*all_together(relief, len(x)).T)
     over_time = playback_curves_at.slices(
@@ -131,14 +129,14 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
         time_stretch=made_with.time_stretch,  # nodes count the animation's frames
         relief=relief,
     )
-    spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
-    points = yield from meanwhile(Progress("write", 0.75), lines.position.unpacking())
+    spans, lines = yield from meanwhile(Progress("write", 0.6), over_time)
+    points = yield from meanwhile(Progress("write", 0.9), lines.position.unpacking())
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines, points)))
         del lines, points  # they are large, and all is in the table
-        yield Progress("write", 0.8)
-        marks = _tread(footprints, place.position, made_with, relief)
         yield Progress("write", 0.9)
+        marks = _tread(footprints, place.position, made_with, relief)
+        yield Progress("write", 0.95)
         yield from baked_ground.write(
             place,
             sample,
@@ -164,7 +162,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             relief,
         )  # all is in the mesh, of which Blender makes another
         if is_draft:
-            yield Progress("write", 0.9)
+            yield Progress("write", 0.95)
         trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
     ground = settings.found(made_with.ground) if made_with.ground else shown
@@ -178,7 +176,7 @@ def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[T
     """What soles trample, where plants give way to it."""
     if made_with.ground is None or trampling_table.of(settings.found(made_with.ground)) is None:
         return None
-    return (yield from meanwhile(Progress("write", 0.9), tramplings.slices(footprints)))
+    return (yield from meanwhile(Progress("write", 0.95), tramplings.slices(footprints)))
 
 
 def sign(
@@ -194,13 +192,10 @@ def sign(
 
     Parameters
     ----------
-    published : Published
-    made_with : BakeSettings
     hashes : mapping of str to str
         See `staleness.store`; of an edited bake, as `staleness.store_again` takes them.
     summary : mapping
         From `bake_report`.
-    warnings : sequence of str
     stamp : str, optional
         That of the bake that was edited.
     """

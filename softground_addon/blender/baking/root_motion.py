@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
@@ -24,8 +24,6 @@ from ..response.response_job import Layer, show_layer
 from ..response.rig_controls import travelling_bone
 from ..translation import translated
 
-Array = NDArray[np.float64]
-
 SPEED = "softground_travel_speed"
 """Note of the speed of the travel [m/s]."""
 
@@ -36,7 +34,6 @@ class Travel:
 
     Attributes
     ----------
-    character : str
     control : str
         The bone that is keyed, or the armature object.
     speed : float
@@ -86,7 +83,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         velocity = yield from meanwhile(Progress("simulate", 1.0), work)
         if velocity is None:
             continue
-        travel, curves = _layer(scene, moving, motion, wanted, velocity)
+        travel, curves = _layer(scene.view_layers[0], moving, motion, wanted, velocity)
         layers.append((moving.armature, travel, curves))
     if not layers:
         raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
@@ -95,7 +92,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         for kind in LayerKind:  # the others were made for a walk on the spot
             remove_layer(armature, kind)
         layer = Layer(curves, {SPEED: f"{travel.speed:.4f}"})
-        show_layer(scene, armature, LayerKind.ROOT_MOTION, layer)
+        show_layer(scene.softground, armature, LayerKind.ROOT_MOTION, layer)
     yield Progress("write", 1.0)
     return tuple(travel for _, travel, _ in layers)
 
@@ -109,7 +106,7 @@ def speed_of(armature: bpy.types.Object) -> float:
 
 
 def _layer(
-    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
     character: CharacterSettings,
     motion: CharacterMotion,
     wanted: BakeSettings,
@@ -118,7 +115,7 @@ def _layer(
     """The keys of one character: on the bone that moves its whole rig, else on the armature object."""
     assert character.armature
     armature = settings.found(character.armature)
-    bone = _bone(scene, armature, RigMapping(character.joints, character.soles, "settings"))
+    bone = _bone(view_layer, armature, RigMapping(character.joints, character.soles, "settings"))
     path = path_of_bone(bone, "location") if bone else "location"
     duration = (motion.frames[-1] - motion.frames[0]) / motion.frame_rate
     way = np.append(duration * velocity, 0.0) / wanted.unit_scale_m
@@ -128,10 +125,10 @@ def _layer(
     return Travel(armature.name, bone or armature.name, float(np.linalg.norm(velocity))), curves
 
 
-def _bone(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> str:
+def _bone(view_layer: bpy.types.ViewLayer, armature: bpy.types.Object, mapping: RigMapping) -> str:
     """The bone to key; empty for the object, as where that turns in the animation."""
     if armature.parent or any(not path.startswith("pose.bones") for path, _ in animated_paths(armature)):
         return ""
-    depsgraph = scene.view_layers[0].depsgraph
+    depsgraph = view_layer.depsgraph
     assert depsgraph is not None
     return travelling_bone(armature, armature.evaluated_get(depsgraph), mapping)

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...core.findings import Finding, listed
 from ...core.motion.motion import CharacterMotion
@@ -42,20 +43,22 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *(finding for motion in shot.motions for finding in _distance(motion, wanted)),
         *_idle_actions(followed, first, last),
         *_idle_drivers(followed),
-        *shape_findings(object_named(sole.object) for one in wanted.characters for sole in one.soles if sole.object),
+        *shape_findings(
+            object_named(sole.object) for character in wanted.characters for sole in character.soles if sole.object
+        ),
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
-        *_gravity(scene, wanted),
+        *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
 
 
-def _gravity(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
     """Gravity that does not point down."""
-    if scene.use_gravity and scene.gravity.length > 0 and -scene.gravity.normalized().z < UPRIGHT:
+    if gravity.length > 0 and -gravity.normalized().z < UPRIGHT:
         yield Finding(
             "gravity_direction",
             "note",
-            f"Gravity of scene '{scene.name}' points along ({', '.join(f'{part:g}' for part in scene.gravity)}), but "
+            f"Gravity of scene '{wanted.scene}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
             f"bodies weigh straight down in a bake, by {wanted.gravity_m_s2:.2f} m/s².",
             "Turn the shot so that down is -Z, and set Gravity in the Scene properties to match.",
         )
@@ -145,13 +148,13 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
 
 def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
     """Bodies without an armature, whose contacts are parts of a shape that changes."""
-    for one in wanted.characters:
-        if one.body and any(map(deforms, meshes_of(settings.found(one.body)))):
+    for character in wanted.characters:
+        if character.body and any(map(deforms, meshes_of(settings.found(character.body)))):
             yield Finding(
                 "followed_shape",
                 "note",
-                f"'{one.name}' has no armature: its contacts {listed(sole.name for sole in one.soles)} are parts that "
-                "keep their shape while it changes.",
+                f"'{character.name}' has no armature: its contacts {listed(sole.name for sole in character.soles)} are "
+                "parts that keep their shape while it changes.",
                 "Check in Contacts that each foot is there, and remove what is none.",
             )
 
@@ -172,7 +175,7 @@ def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
 
 def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
     """Copies of what prints that are instances."""
-    showing = instancers(scene, staleness.bodies_of(scene, wanted))
+    showing = instancers(scene, staleness.bodies_of(scene.objects, wanted))
     return [
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())

@@ -1,21 +1,15 @@
-"""What a shot leaves: pressed from the settings and from what was read, or as the last bake has it from the same.
-
-All is read anew at each bake, and compared by value: keys, rigs, meshes and settings that have changed give other
-prints, whoever has changed them.
-"""
+"""What a shot leaves: pressed from the settings and from what was read, or as the last bake has it from the same."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
-from ...core.composers.pressed_shot import offsets_mm, press_shot
+from ...core.composers.pressed_shot import loads_standing, offsets_mm, press_shot
 from ...core.composers.responses import CharacterResponse, gap_table
 from ...core.debris.debris import Debris
 from ...core.events.events import events
@@ -23,18 +17,20 @@ from ...core.files import report
 from ...core.findings import Finding
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
-from ...core.numerics.packed import PackedArray
+from ...core.loads.estimate import CharacterLoads, follows_landings
+from ...core.motion.motion import CharacterMotion
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
+from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
+from ..kept import kept
 from ..reading.shots import Shot
-from ..state import state
 from .publish import marks_left, with_debris
 
-LARGEST = 2**26
-"""Most that is held for the next bake [bytes]: a minute of walking takes half of it."""
+_Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
+"""From `loads_standing`."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,6 @@ class ShotPrints:
         What steps throw.
     marks : Marks or None
         Those on hard ground.
-    responses : list of CharacterResponse
     findings : tuple of Finding
         What checks say of them.
     happened : list of dict
@@ -67,38 +62,32 @@ class ShotPrints:
     reported: Mapping[str, Any]
 
 
-def forget() -> None:
-    """Press anew at the next bake, and give back what is held for it."""
-    state.prints = None
-
-
 def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
-    """What a shot leaves; errors as of `press_shot`."""
-    source = yield from _source(wanted, shot, ground, edits)
-    if source and state.prints and state.prints[0] == source:
-        prints: ShotPrints = state.prints[1]
-        return prints
-    forget()  # room for those that come
-    prints = yield from _pressed(wanted, shot, ground, edits)
-    if source and prints.marks is None and _size(prints) <= LARGEST:
-        state.prints = source, prints
-    return prints
-
-
-def _source(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[str]:
-    """A hash of all that the prints follow from; empty where they are of no mesh, or of more than can be compared."""
-    if not isinstance(ground.terrain, MeshTerrain):
-        return ""
+    """What a shot leaves; errors as of `loads_standing` and `press_shot`."""
+    begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
+    lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
+    if not isinstance(ground.terrain, MeshTerrain):  # what is made or hard is not compared
+        return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), ground, edits))
+    read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, ground.terrain))
+    source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
+    stood = yield from kept(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
-    still = replace(ground, weathering=None)  # which the settings have
+    painted = ground.variation, ground.regions  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
-    hashing = report.hash_inputs.slices(before, after, shot.motions, still, edits, skins)
-    return (yield from meanwhile(Progress("simulate", 0.0), hashing))
+    pressing = _pressed(wanted, shot, stood, ground, edits)
+    return (yield from kept(begun, "prints", (read, before, after, painted, edits, skins), pressing))
 
 
-def _pressed(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
-    at_end = Progress("simulate", 1.0)
-    pressing = press_shot(wanted, shot.motions, ground, edits, shot.surface.factors if shot.surface else None)
+def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
+    work = loads_standing.slices(wanted, shot.motions, shot.terrain)
+    return (yield from meanwhile(Progress("simulate", 0.0), work))
+
+
+def _pressed(
+    wanted: BakeSettings, shot: Shot, stood: _Stood, ground: SoftGround, edits: Mapping[str, StepEdit]
+) -> Job[ShotPrints]:
+    at_end, factors = Progress("simulate", 1.0), shot.surface.factors if shot.surface else None
+    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
     carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
@@ -132,17 +121,3 @@ def _bottomed_out(wanted: BakeSettings, footprints: Sequence[Footprint], ground:
         steps = [step for step in footprints if (step.surface or wanted.surface) == surface]
         findings += bottomed_out(steps, material, ground)
     return findings
-
-
-def _size(*values: Any) -> int:
-    """About the memory that values take [bytes], those that they share once."""
-    waiting, seen, size = list(values), set[int](), 0
-    while waiting:
-        value = waiting.pop()
-        if id(value) in seen or isinstance(value, type):
-            continue
-        seen.add(id(value))
-        size += value.nbytes if isinstance(value, np.ndarray | PackedArray) else 50
-        waiting += value.values() if isinstance(value, Mapping) else getattr(value, "__dict__", {}).values()
-        waiting += value if isinstance(value, list | tuple) else ()
-    return size

@@ -31,10 +31,10 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     if not any(character.armature for character in characters_of(scene.softground)):
         raise InputError("No character here has feet to lower: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
-    hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene, wanted)
+    hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene.objects, wanted)
     if hashes and wanted.ground:
         edits = baked_ground.edits_of(settings.found(wanted.ground))
-        hashes |= staleness.of_soles(scene, mesh_soles(edits))
+        hashes |= staleness.of_soles(scene.objects, mesh_soles(edits))
     result = yield from bake(scene, wanted=wanted)
     options = scene.softground
     options.grounding.by_button |= not options.grounding.use

@@ -43,12 +43,10 @@ class EditableBake:
 
     Attributes
     ----------
-    left : BakeRecord
     made_with : BakeSettings
         The scene's settings, but for what the prints were pressed with.
     shot : Shot
         The undisturbed ground; nobody is on it.
-    steps : EditedSteps
     """
 
     left: record.BakeRecord
@@ -61,11 +59,6 @@ class EditableBake:
         return EditedSteps.left_with(self.steps, self.left, edits)
 
 
-def editable(scene: bpy.types.Scene) -> EditableBake:
-    """The bake on the scene's ground, to be edited; errors as of `reading`."""
-    return jobs.run(reading(scene))
-
-
 def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     """The bake on the scene's ground, to be edited, in steps.
 
@@ -76,7 +69,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     """
     ground = scene.softground.ground
     left = baked_ground.record_of(ground)
-    made_with = _made_with(scene, left)
+    made_with = _made_with(settings.snapshot(scene), left)
     names = painted_ground.names_of(ground, made_with.painted)
     undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, made_with.kinds[1])
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
@@ -87,11 +80,6 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     return EditableBake(
         left, made_with, shot, EditedSteps(left.footprints, ground_of(made_with, shot), made_with.cell_size_m)
     )
-
-
-def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> None:
-    """Show the bake on the scene's ground with other edits; errors as of `editing`."""
-    jobs.run(editing(scene, bake, edits))
 
 
 def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> jobs.Job[None]:
@@ -120,7 +108,7 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
     sign(
         published,
         bake.made_with,
-        _sole_hashes(scene, stamp, bake, edits),
+        _sole_hashes(scene.objects, stamp, bake, edits),
         summary=summary | bake_report.summary_of_prints(left.edited),
         warnings=warnings,
         stamp=stamp,
@@ -128,23 +116,21 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
 
 
 def _sole_hashes(
-    scene: bpy.types.Scene, stamp: str, bake: EditableBake, edits: Mapping[str, StepEdit]
+    objects: settings.Objects, stamp: str, bake: EditableBake, edits: Mapping[str, StepEdit]
 ) -> dict[str, str]:
     """Hashes of the meshes whose soles press steps, of those that were not read again as they were noted."""
     soles, before = mesh_soles(edits), mesh_soles(bake.left.edits)
     noted: dict[str, str] = json.loads(stamp) if stamp else {}
-    now = staleness.of_soles(scene, soles)
+    now = staleness.of_soles(objects, soles)
     same = {f"{staleness.SOLE}:{name}" for name, sole in soles.items() if before.get(name) == sole}
     return {key: noted.get(key, value) if key in same else value for key, value in now.items()}
 
 
-def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
-    """The scene's settings, with those that the prints were pressed and put on the ground with."""
-    now = settings.snapshot(scene)
+def _made_with(now: BakeSettings, left: record.BakeRecord) -> BakeSettings:
+    """The settings of now, with those that the prints were pressed and put on the ground with."""
     try:
         inputs = left.about["inputs"]
         on_ground = {name: type(value)(inputs[name]) for name, value in now.between(Acts.WRITING, Acts.WRITING).items()}
-        units = baked_ground.units_of(inputs)
         surfaces.find(inputs["surface"])
         if inputs["pressure"] not in get_args(Pressure):
             raise ValueError("there is no such pressure")
@@ -157,11 +143,8 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             pressure=inputs["pressure"],
             painted=(stiffness, layer_depth, rim),
             frames=baked_ground.frames_of(inputs),
-            cell_size_m=units["cell_size_m"],
-            frame_rate=units["frame_rate"],
-            time_stretch=units["time_stretch"],
-            gravity_m_s2=units["gravity_m_s2"],
-            unit_scale_m=units["unit_scale_m"],
+            cell_size_m=baked_ground.unit_of(inputs, "cell_size_m"),
+            **vars(baked_ground.units_of(inputs)),
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
             regions=tuple(map(_region, inputs.get("regions", ()))),

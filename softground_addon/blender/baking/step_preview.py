@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import bpy
 import numpy as np
@@ -26,13 +26,7 @@ REACH = 4.0
 
 
 class StepPreview:
-    """The ground of a bake, finished, as it would be with other edits.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    bake : EditableBake
-    """
+    """The ground of a bake, finished, as it would be with other edits."""
 
     def __init__(self, ground: bpy.types.Object, bake: EditableBake) -> None:
         shown = baked_ground.display_mesh_of(ground)
@@ -53,7 +47,9 @@ class StepPreview:
     def show(self, edits: Mapping[str, StepEdit]) -> None:
         """Show the ground with these edits."""
         left = self._bake.with_edits(edits)
-        windows = _windows(self._bake.left.footprints, self._bake.left.pressed_again, left.pressed_again)
+        baked = self._bake.left
+        windows = _windows(dict(enumerate(baked.footprints)), baked.pressed_again, left.pressed_again)
+        windows += _windows({}, baked.laid_carves, left.laid_carves)
         near = np.flatnonzero(self._within([*windows, *self._changed], self._x, self._y))
         self._changed = windows
         positions = self._before.copy()
@@ -102,9 +98,8 @@ class StepPreview:
 
 
 def _windows(
-    baked: Sequence[Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
+    unedited: Mapping[int, Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
 ) -> list[Window]:
     """Where the prints of two sets of edits differ."""
-    unedited = dict(enumerate(baked))
     pairs = ([left.get(n, unedited.get(n)) for left in (before, after)] for n in sorted({*before, *after}))
     return [side.window for pair in pairs if pair[0] is not pair[1] for side in pair if side]

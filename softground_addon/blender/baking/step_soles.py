@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array
 from ...core.record.edits import StepEdit, mesh_soles, with_meshes
 from ...core.record.mesh_sole import LONGEST, SHORTEST, MeshSole
 from ...core.settings import BakeSettings
@@ -21,20 +21,19 @@ _FROM_SCENE = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 _REMEDY = "or choose another sole for the steps that it presses"
 
 
-def object_of(scene: bpy.types.Scene, name: str) -> bpy.types.Object | None:
-    """The object of a scene that edits call so, by its full name, which tells linked ones from local ones."""
-    return next((obj for obj in scene.objects if obj.name_full == name), None)
+def object_of(objects: settings.Objects, name: str) -> bpy.types.Object | None:
+    """The object that edits call so, by its full name, which tells linked ones from local ones."""
+    return next((obj for obj in objects if obj.name_full == name), None)
 
 
-def names(scene: bpy.types.Scene) -> list[str]:
+def names(objects: settings.Objects, ground: bpy.types.Object | None) -> list[str]:
     """Objects that steps may take their sole from: the meshes but the ground and what shows its prints."""
-    ground = scene.softground.ground
     grounds = {ground, baked_ground.display_mesh_of(ground)} if ground else set()
-    return [obj.name_full for obj in scene.objects if obj.type == "MESH" and obj not in grounds]
+    return [obj.name_full for obj in objects if obj.type == "MESH" and obj not in grounds]
 
 
 def edits_with_soles(
-    scene: bpy.types.Scene, wanted: BakeSettings, edits: Mapping[str, StepEdit] | None
+    objects: settings.Objects, wanted: BakeSettings, edits: Mapping[str, StepEdit] | None
 ) -> dict[str, StepEdit]:
     """Edits for a bake, by default those on its ground, with the soles of the meshes that they name as these are now.
 
@@ -51,7 +50,7 @@ def edits_with_soles(
     on_ground = baked_ground.edits_of(ground, [character.name for character in wanted.characters]) if ground else {}
     edits = on_ground if edits is None else edits
     named = {edit.sole for edit in edits.values() if edit.sole}
-    here = {name: read(obj, ground, wanted.unit_scale_m) for name in sorted(named) if (obj := object_of(scene, name))}
+    here = {name: read(obj, ground, wanted.unit_scale_m) for name in sorted(named) if (obj := object_of(objects, name))}
     return with_meshes(edits, mesh_soles(on_ground) | mesh_soles(edits) | here)
 
 
@@ -60,7 +59,6 @@ def read(obj: bpy.types.Object, ground: bpy.types.Object | None, unit_scale: flo
 
     Parameters
     ----------
-    obj : bpy.types.Object
     ground : bpy.types.Object or None
         That it is to press.
     unit_scale : float

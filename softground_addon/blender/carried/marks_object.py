@@ -35,16 +35,8 @@ FLOORS, THICKNESS = "softground_floors", "softground_thickness"
 
 
 def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: SceneUnits) -> bpy.types.Object | None:
-    """Let a ground have marks in place of those that it may have; None takes them away.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    marks : Marks or None
-    surface : str
-    units : SceneUnits
-    """
-    older = BELONGS.kept(ground, wanted=marks is not None and bool(len(marks.faces)))
+    """Let a ground have marks in place of those that it may have; None takes them away."""
+    older = BELONGS.remaining(ground, wanted=marks is not None and bool(len(marks.faces)))
     _remove_unused()
     if marks is None or not len(marks.faces):
         return None
@@ -145,8 +137,8 @@ def _remove_unused() -> None:
 
 def _is_ours_of_another(obj: bpy.types.Object, surface: str) -> bool:
     """True if its materials are ours, and none for this surface."""
-    found = [slot.get(nodes.MARK) for slot in obj.data.materials if slot is not None]
-    return all(found) and surface not in found
+    looks = [slot.get(nodes.MARK) for slot in obj.data.materials if slot is not None]
+    return all(looks) and surface not in looks
 
 
 def _modifier_of(obj: bpy.types.Object) -> Any:
@@ -169,8 +161,10 @@ def _play(modifier: Any, group: Any) -> None:
         return
     values = {name: value for name, value, *_ in nodes.INPUTS}
     if modifier.node_group:
-        kept = {name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if name in values}
-        values |= {name: value for name, value in kept.items() if value is not None}
+        set_values = {
+            name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if name in values
+        }
+        values |= {name: value for name, value in set_values.items() if value is not None}
     modifier.node_group = group
     set_inputs(modifier, values)
 

@@ -63,13 +63,13 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
-    _fill(scene, character, mapping)
+    _fill(scene.unit_settings.scale_length, character, mapping)
     if mapping.mass:
         character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
     take_frames(scene, animated_frames(scene, armature))
     character.sole_length = length
-    fit_ground(scene)
+    fit_ground(scene.softground)
     return character
 
 
@@ -97,13 +97,13 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     length = yield from _shortest_sole(scene, found(name), recognised)
     character = settings.characters.add()
     character.name, character.body = name.name, found(name)
-    _fill(scene, character, recognised.mapping)
+    _fill(scene.unit_settings.scale_length, character, recognised.mapping)
     character.mass = recognised.mapping.mass or character.mass
     settings.active_character = len(settings.characters) - 1
     stretch = time_stretch_of(scene)
     take_frames(scene, (round(frames[0] * stretch), round(frames[1] * stretch)))
     character.sole_length = length
-    fit_ground(scene)
+    fit_ground(scene.softground)
     return character
 
 
@@ -158,11 +158,11 @@ POSE_TIME = 1.0
 """How long a pose of one frame is held [s]: by then all grounds of the presets have yielded."""
 
 
-def fit_ground(scene: bpy.types.Scene) -> None:
+def fit_ground(options: Any) -> None:
     """Let the ground fit a character that was just added: by the default preset if it is the first."""
-    if len(characters_of(scene.softground)) == 1:
-        take_defaults(scene.softground)
-    fit_cells(scene.softground)
+    if len(characters_of(options)) == 1:
+        take_defaults(options)
+    fit_cells(options)
 
 
 def take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
@@ -188,7 +188,7 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
         If its size needs no change, or it is linked.
     """
     armature = character.armature
-    size = stature_of(scene, armature) if armature else 0.0
+    size = stature_of(scene.unit_settings.scale_length, armature) if armature else 0.0
     factor = scale_to_metres(size, captured=is_captured(character))
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
@@ -217,13 +217,13 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     mapping = (yield from recognise(scene, armature, animated_frames(scene, armature))).mapping
     if not mapping.soles:
         raise InputError(f"No feet found in '{armature.name}': {CHOOSE_CONTACTS}.")
-    _fill(scene, scene.softground.characters[number], mapping)
+    _fill(scene.unit_settings.scale_length, scene.softground.characters[number], mapping)
     return [source.name for source in mapping.soles]
 
 
-def _fill(scene: bpy.types.Scene, character: SoftGroundCharacter, mapping: RigMapping) -> None:
+def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping) -> None:
     character.skin_mass = mapping.mass
-    character.size = size_of(scene, character.armature) if character.armature else 0.0
+    character.size = size_of(unit_scale, character.armature) if character.armature else 0.0
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 import numpy as np
@@ -82,9 +83,7 @@ def add_vertex_contacts(character: SoftGroundCharacter, skin: bpy.types.Object) 
     return added
 
 
-def add_object_contacts(
-    scene: bpy.types.Scene, character: SoftGroundCharacter, props: Iterable[bpy.types.Object]
-) -> list[str]:
+def add_object_contacts(options: Any, character: SoftGroundCharacter, props: Iterable[bpy.types.Object]) -> list[str]:
     """Let objects print as soles of a character: canes, snowshoes, wheels; names of those that were added.
 
     Raises
@@ -100,7 +99,7 @@ def add_object_contacts(
     if character.body:
         raise InputError(f"'{character.name}' has no armature, and prints with its own parts: add a prop by itself.")
     for obj in props:
-        check_printable(scene, obj)
+        check_printable(options, obj)
     for obj in props:
         sole = character.soles.add()
         sole.name, sole.object = obj.name, obj
@@ -114,18 +113,18 @@ def _side_of(name: str) -> str:
     return next((side for end, side in ((".L", "LEFT"), (".R", "RIGHT")) if name.upper().endswith(end)), "NONE")
 
 
-def check_printable(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+def check_printable(options: Any, obj: bpy.types.Object) -> None:
     check_libraries(obj)
     if obj.type != "MESH":
         raise InputError(
             f"'{obj.name}' is not a mesh but of type {obj.type.title()}: select an animated armature, or mesh "
             "objects that fall or roll."
         )
-    if obj == scene.softground.ground:
+    if obj == options.ground:
         raise InputError(f"'{obj.name}' is the ground: select what moves on it.")
     if not obj.data.polygons and not obj.modifiers:
         raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or select another object.")
-    for character in scene.softground.characters:
+    for character in options.characters:
         if any(sole.object == obj for sole in character.soles):
             raise InputError(
                 f"'{obj.name}' already prints, as a sole of '{title_of(character)}': select another object."

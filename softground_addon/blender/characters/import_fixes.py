@@ -17,14 +17,14 @@ from ..sampling.skin_sampling import meshes_on
 from ..settings import frame_rate_of, time_stretch_of
 
 
-def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
+def size_of(unit_scale: float, armature: bpy.types.Object) -> float:
     """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog; 0 without bones."""
-    return extent(_heads(armature), np.array(armature.matrix_world)) * scene.unit_settings.scale_length
+    return extent(_heads(armature), np.array(armature.matrix_world)) * unit_scale
 
 
-def stature_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
+def stature_of(unit_scale: float, armature: bpy.types.Object) -> float:
     """Its `CharacterMotion.stature` as it stands now [m]; 0 without bones."""
-    return stature(_heads(armature), np.array(armature.matrix_world)) * scene.unit_settings.scale_length
+    return stature(_heads(armature), np.array(armature.matrix_world)) * unit_scale
 
 
 def has_legs(character: Any) -> bool:
@@ -53,7 +53,7 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
     InputError
         If it is linked from another file.
     """
-    tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene, armature)))
+    tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene.objects, armature)))
     linked = next((obj for obj in tops if obj.library), None)
     if linked is not None:
         raise InputError(

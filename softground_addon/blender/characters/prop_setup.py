@@ -36,7 +36,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
     if not props:
         raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
     for obj in props:
-        check_printable(scene, obj)
+        check_printable(scene.softground, obj)
         for character in scene.softground.characters:
             if character.armature and character.armature in ancestors(obj):
                 raise InputError(
@@ -46,12 +46,12 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
     groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     for obj in props:
         groups.setdefault(_root(obj), []).append(obj)
-    added = []
+    added, unit_scale = [], scene.unit_settings.scale_length
     for root, members in groups.items():
         character = scene.softground.characters.add()
         character.name = (members[0] if len(members) == 1 else root).name
-        character.mass = _guessed_mass(scene, members)
-        size = min(float(np.array(obj.dimensions).max()) for obj in members) * scene.unit_settings.scale_length
+        character.mass = _guessed_mass(members, scene.view_layers[0], unit_scale)
+        size = min(float(np.array(obj.dimensions).max()) for obj in members) * unit_scale
         character.sole_length = min(size, LONGEST_OF_LIMBS)
         for obj in members:
             sole = character.soles.add()
@@ -59,7 +59,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
         added.append(character)
         for obj in members:
             take_frames(scene, _moving_frames(scene, obj))
-        fit_ground(scene)
+        fit_ground(scene.softground)
     scene.softground.active_character = len(scene.softground.characters) - 1
     return added
 
@@ -68,15 +68,15 @@ def _root(obj: bpy.types.Object) -> bpy.types.Object:
     return ([obj, *ancestors(obj)])[-1]
 
 
-def _guessed_mass(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> float:
+def _guessed_mass(props: Iterable[bpy.types.Object], view_layer: bpy.types.ViewLayer, unit_scale: float) -> float:
     """Mass of some objects [kg]: that of their rigid bodies, or from their volume, to two digits."""
     total = 0.0
     for obj in props:
         if obj.rigid_body:
             total += obj.rigid_body.mass
             continue
-        vertices, triangles = surface_of(scene, obj)
-        to_world = np.array(obj.matrix_world)[:3, :3] * scene.unit_settings.scale_length
+        vertices, triangles = surface_of(view_layer, obj)
+        to_world = np.array(obj.matrix_world)[:3, :3] * unit_scale
         total += mass_properties(vertices @ to_world.T, triangles).volume * DENSITY
     if not total > 0:
         return 1.0

@@ -61,8 +61,6 @@ def recognise(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    armature : bpy.types.Object
     frames : tuple of int, optional
         First and last frame of its animation.
 
@@ -81,7 +79,7 @@ def recognise(
     if armature.mode == "EDIT":
         return Recognised(mapping)
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
-    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
+    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature))
     armature = found(rig)
     if armature.mode == "EDIT":
         return Recognised(mapping)
@@ -141,7 +139,7 @@ def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[Sol
 
     Legs that the rest pose alone tells are none if the character bears on other parts, and never on these.
     """
-    soles, left = [], list(seen)
+    soles, remaining = [], list(seen)
     bare = [source for source in mapping.soles if not skin.weight_of(bone_families(bones, source)[0]).any()]
     legs = {bone for joint, (bone, _) in mapping.joints.items() if joint.startswith(("hip_", "knee_", "ankle_"))}
     shows_legs = len(seen) >= len(bare) or any(legs & {*contact.parts} for contact in seen)
@@ -149,11 +147,11 @@ def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[Sol
         if source in bare and shows_legs:
             continue
         family, _ = bone_families(bones, source)
-        same = [contact for contact in left if family & {*contact.parts}]
-        left = [contact for contact in left if contact not in same]
+        same = [contact for contact in remaining if family & {*contact.parts}]
+        remaining = [contact for contact in remaining if contact not in same]
         parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
         soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))
-    if mapping.method == "rest pose" and left == list(seen) != []:
+    if mapping.method == "rest pose" and remaining == list(seen) != []:
         return RigMapping(soles=seen, method="skin")
-    others = (replace(contact, limb=contact.limb or bool(mapping.soles)) for contact in left)
+    others = (replace(contact, limb=contact.limb or bool(mapping.soles)) for contact in remaining)
     return replace(mapping, soles=(*soles, *others))

@@ -1,8 +1,9 @@
-"""Whom a user means: from what is selected, or from all of a scene, to the rigs and objects that print."""
+"""Rigs and objects that print, from what a user has selected, or from all of a scene."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import bpy
 
@@ -16,6 +17,7 @@ from ..sampling.instances import crowd_finding, instancers
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import is_simulated
 from ..sampling.skin_sampling import meshes_on
+from ..settings import Objects
 from .character_setup import add_character, adding_body
 
 
@@ -34,7 +36,7 @@ def chosen(
     """
     picked = list(dict.fromkeys(obj for obj in (active, *selected) if obj is not None))
     known = {character.armature for character in scene.softground.characters}
-    rigs = list(dict.fromkeys(skin_rig(scene, rig) for obj in picked for rig in _rigs_of(obj, known)))
+    rigs = list(dict.fromkeys(skin_rig(scene.objects, rig) for obj in picked for rig in _rigs_of(obj, known)))
     if not rigs:
         _check_no_crowd(scene, picked)
     fresh = [rig for rig in rigs if rig not in known]
@@ -44,7 +46,7 @@ def chosen(
         return fresh or rigs[:1], []
     if fresh or moving:
         return fresh, moving if fresh else props
-    walkers = [rig for rig in walkers_of(scene) if rig not in known]
+    walkers = [rig for rig in walkers_of(scene.objects) if rig not in known]
     if bodies := [obj for obj in picked if is_body(obj)]:
         return bodies, []
     if len(walkers) == 1:
@@ -96,14 +98,14 @@ def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[b
     return [below for below in obj.children_recursive if below.type == "ARMATURE"]
 
 
-def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Object:
+def skin_rig(objects: Objects, armature: bpy.types.Object) -> bpy.types.Object:
     """The armature that moves the skin where another one controls it, or the body that wears it; itself if it does, or
     none is found."""
     if armature.type != "ARMATURE":
         return armature
-    bodies = [obj for obj in scene.objects if obj.type == "ARMATURE" and meshes_on(scene, obj)]
+    bodies = [obj for obj in objects if obj.type == "ARMATURE" and meshes_on(objects, obj)]
     moving = [armature] if armature in bodies else [obj for obj in bodies if armature in all_leaders(obj)]
-    wearers = {next((body for body in bodies if rig in worn_rigs(scene, body)), rig) for rig in moving}
+    wearers = {next((body for body in bodies if rig in worn_rigs(objects, body)), rig) for rig in moving}
     return wearers.pop() if len(wearers) == 1 else armature
 
 
@@ -119,11 +121,11 @@ def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
     return reached - {obj}
 
 
-def walkers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The armatures of a scene that move; where some of them move a skin, those."""
-    moving = [obj for obj in scene.objects if obj.type == "ARMATURE" and is_animated(obj)]
-    rigs = list(dict.fromkeys(skin_rig(scene, rig) for rig in moving))
-    return [rig for rig in rigs if meshes_on(scene, rig)] or rigs
+def walkers_of(objects: Objects) -> list[bpy.types.Object]:
+    """The armatures that move; where some of them move a skin, those."""
+    moving = [obj for obj in objects if obj.type == "ARMATURE" and is_animated(obj)]
+    rigs = list(dict.fromkeys(skin_rig(objects, rig) for rig in moving))
+    return [rig for rig in rigs if meshes_on(objects, rig)] or rigs
 
 
 def set_up_automatically(scene: bpy.types.Scene) -> None:
@@ -145,26 +147,25 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             require_armature(inside)
         bodies = [obj for obj in scene.objects if not obj.parent and (is_body(obj) or deforms(obj))]
         if len(bodies) == 1:
-            _leave_as_it_is(scene)
+            _leave_as_it_is(scene.softground)
             if jobs.run(adding_body(scene, bodies[0])):
                 return
         raise InputError(
             f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
             "with Add Character in the SoftGround panel."
         )
-    rigs = walkers_of(scene) or armatures
+    rigs = walkers_of(scene.objects) or armatures
     if len(rigs) > 1:
         raise InputError(
             f"Scene '{scene.name}' has several armatures ({_names(rigs)}): select those that walk, press Add "
             "Character in the SoftGround panel, and save the file."
         )
-    _leave_as_it_is(scene)
+    _leave_as_it_is(scene.softground)
     add_character(scene, rigs[0])
 
 
-def _leave_as_it_is(scene: bpy.types.Scene) -> None:
+def _leave_as_it_is(options: Any) -> None:
     """Settings where nobody looks on."""
-    options = scene.softground
     if not options.is_property_set("sink_feet"):
         options.sink_feet = False  # an animation is changed where that was asked for
     if not options.is_property_set("relief"):

@@ -203,7 +203,7 @@ def _export(options: argparse.Namespace) -> None:
         _open(options.blend)
     scene = _scene(options.scene)
     kind = options.format.upper().replace("-", "_")
-    asked = options.output.absolute() if options.output else export_formats.default_path(scene, kind)
+    asked = options.output.absolute() if options.output else export_formats.default_path(scene.softground.ground, kind)
     path = export_formats.check_suffix(asked, kind)
     start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
     if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:

@@ -98,14 +98,16 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
     """Points at their places at the time, with their velocity."""
     age, flight, drag = (graph.attribute(name) for name in (AGE, FLIGHT, DRAG))
     time = graph.math("MINIMUM", age, flight)
-    left = graph.math("EXPONENT", graph.math("DIVIDE", graph.math("MULTIPLY", time, -1.0), drag))
-    passed = graph.math("MULTIPLY", drag, graph.math("SUBTRACT", 1.0, left))
+    remaining = graph.math("EXPONENT", graph.math("DIVIDE", graph.math("MULTIPLY", time, -1.0), drag))
+    passed = graph.math("MULTIPLY", drag, graph.math("SUBTRACT", 1.0, remaining))
     launch = graph.attribute(LAUNCH, "FLOAT_VECTOR")
     fall = graph.node("ShaderNodeCombineXYZ")
     graph.link(graph.math("MULTIPLY", drag, -gravity / unit_scale), fall.inputs["Z"])
     drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall.outputs["Vector"])
     moved = graph.vector("ADD", graph.scaled(launch, passed), graph.scaled(drift, graph.math("SUBTRACT", time, passed)))
-    speed = graph.vector("ADD", graph.scaled(launch, left), graph.scaled(drift, graph.math("SUBTRACT", 1.0, left)))
+    speed = graph.vector(
+        "ADD", graph.scaled(launch, remaining), graph.scaled(drift, graph.math("SUBTRACT", 1.0, remaining))
+    )
 
     born = graph.logic("NOT", graph.less(age, 0.0))
     flies = graph.both(graph.less(age, flight), born)
@@ -131,9 +133,9 @@ def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> An
     info.inputs["Reset Children"].default_value = True
     graph.link(collection, info.inputs["Collection"])
     time = graph.math("MINIMUM", graph.attribute(AGE), graph.attribute(FLIGHT))
-    left = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
+    remaining = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
     heading = graph.random((0.0, 0.0, 0.0), (0.0, 0.0, 2 * pi), 4, "FLOAT_VECTOR")
-    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), left), heading)
+    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), remaining), heading)
     on_points = graph.node("GeometryNodeInstanceOnPoints")
     on_points.inputs["Pick Instance"].default_value = True
     for source, socket in (

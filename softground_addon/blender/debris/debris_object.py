@@ -65,14 +65,10 @@ def put(
 
     Parameters
     ----------
-    ground : bpy.types.Object
-    debris : Debris or None
-    surface : str
-    units : SceneUnits
     of_steps : mapping of int to str
         Surfaces of steps, by their numbers, on a ground with regions.
     """
-    older = BELONGS.kept(ground, wanted=debris is not None and bool(len(debris.birth)))
+    older = BELONGS.remaining(ground, wanted=debris is not None and bool(len(debris.birth)))
     _remove_unused()
     if debris is None or not len(debris.birth):
         return None
@@ -106,16 +102,8 @@ def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
     return compat.input_field(modifier, inputs_of(modifier)[name]) if modifier else None
 
 
-def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, unit_scale: float) -> AtRest:
-    """Places where the pieces of debris come to rest in the wind of the moment, without those that never do.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object
-        From `of`.
-    frame_rate, time_stretch, unit_scale
-        As of `put`.
-    """
+def at_rest(obj: bpy.types.Object, units: SceneUnits) -> AtRest:
+    """Places where the pieces of debris (`of`) come to rest in the wind of the moment, without those that never do."""
     points: Any = obj.data
     count, modifier = len(points.vertices), _modifier_of(obj)
 
@@ -129,10 +117,10 @@ def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, un
     time, drag = values(nodes.FLIGHT), values(nodes.DRAG)
     wind = compat.read_input(modifier, inputs_of(modifier)["Wind"]) if modifier else None
     drift = np.outer(time - flight.coasting(drag, time), tuple(wind or (0.0, 0.0, 0.0))[:2])
-    landed = values(nodes.BIRTH) / time_stretch + time * frame_rate
+    landed = values(nodes.BIRTH) / units.time_stretch + time * units.frame_rate
     down = time < flight.LONGEST_FLIGHT - 1e-3
-    at = (place.reshape(-1, 3) + np.array(_origin_of(obj)))[:, :2] * unit_scale + drift
-    return AtRest(at[down], values(nodes.RADIUS)[down] * unit_scale, landed[down])
+    at = (place.reshape(-1, 3) + np.array(_origin_of(obj)))[:, :2] * units.unit_scale_m + drift
+    return AtRest(at[down], values(nodes.RADIUS)[down] * units.unit_scale_m, landed[down])
 
 
 class Pieces:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import bpy
@@ -26,14 +26,13 @@ from ..debris import debris_object
 from ..jobs import Job, Progress
 from ..plants import trampling_table
 from ..playback import own_data, playback
-from ..settings import exists, found, name_of
+from ..settings import SceneUnits, exists, found, name_of
 from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-UNITS = ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m")
 LARGEST_UNIT = 1e12
 """Of any of these, and 1 over the smallest: what is beyond is damage."""
 EVENTS = "events"
@@ -154,7 +153,6 @@ def write(
 
     Parameters
     ----------
-    place : Place
     sample : GroundSample
         The finished ground at the place's positions.
     spans : Spans
@@ -179,7 +177,7 @@ def write(
     with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
         ground_mesh.write(found(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
         if place.is_draft:
-            yield Progress("write", 0.9)
+            yield Progress("write", 0.95)
         display_mesh = found(place.display_mesh)
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
@@ -275,7 +273,7 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     table = left.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    return as_edited(table, left.steps)
+    return as_edited(table, left.steps, left.laid_carves)
 
 
 def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
@@ -304,18 +302,23 @@ def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str
     return edits
 
 
-def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:
-    """What the frames, lengths and forces of a bake are in, by the inputs that its record has.
+def units_of(inputs: Mapping[str, Any]) -> SceneUnits:
+    """Units of the frames, lengths and forces of a bake, by the inputs that its record has; errors as `unit_of`."""
+    return SceneUnits(**{each.name: unit_of(inputs, each.name) for each in fields(SceneUnits)})
+
+
+def unit_of(inputs: Mapping[str, Any], name: str) -> float:
+    """A unit or the cell size (`cell_size_m`) of a bake, by the inputs that its record has.
 
     Raises
     ------
     KeyError, TypeError, ValueError, OverflowError
-        If they are damaged.
+        If it is damaged.
     """
-    units = {name: float(inputs[name]) for name in UNITS}
-    if not all(1.0 / LARGEST_UNIT <= unit <= LARGEST_UNIT for unit in units.values()):
+    unit = float(inputs[name])
+    if not 1.0 / LARGEST_UNIT <= unit <= LARGEST_UNIT:
         raise ValueError("its units are unknown")
-    return units
+    return unit
 
 
 def frames_of(inputs: Mapping[str, Any]) -> tuple[int, int]:

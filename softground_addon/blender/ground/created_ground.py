@@ -178,8 +178,8 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
 
 
 def _discard_unpublished(name: ObjectName) -> None:
-    if (left := find(name)) is not None and not left.users_collection:
-        discard(left)
+    if (remaining := find(name)) is not None and not remaining.users_collection:
+        discard(remaining)
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:

@@ -15,15 +15,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array, Indices
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
 from .. import mesh_arrays
 from ..plants import trampling_table
 from ..playback import display_key, own_data, playback, weather_modifier
 from ..playback.own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 SHOWN = ("steps", "max_depth_m", "typical_depth_m", "peak_force_n")
 """Numbers that every summary has."""
@@ -84,7 +82,6 @@ def write(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     index : (K,) int array
         Vertices of its mesh that the bake moves.
     pressed : GroundSample

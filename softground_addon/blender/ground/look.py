@@ -16,11 +16,11 @@ from ..materials.materials import MARK, ensure_material, ensure_over
 from .baked_ground import display_mesh_of
 
 
-def follow(scene: bpy.types.Scene) -> None:
+def follow(options: Any) -> None:
     """Show the scene's surface on its ground wherever the add-on's own material is."""
-    ground = scene.softground.ground
+    ground = options.ground
     for obj in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
-        _show(obj, scene.softground.material.surface, over_theirs=False)
+        _show(obj, options.material.surface, over_theirs=False)
 
 
 def apply(ground: bpy.types.Object, surface: str) -> int:
@@ -48,20 +48,20 @@ def take_off(obj: bpy.types.Object) -> None:
 
 def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
     for slot in _writable_slots(obj):
-        now, own = slot.material, surface
+        now, look = slot.material, surface
         if (named := theirs(now)) and named.softground_preset:
             if named.softground_preset == HARD:
                 continue
-            own = surface_of(now) or surface
+            look = surface_of(now) or surface
         if now is None:
             if over_theirs:
-                slot.material = ensure_material(own)
+                slot.material = ensure_material(look)
         elif mixed_over := now.get(OVER):
-            _replace(slot, ensure_over(mixed_over, own))
+            _replace(slot, ensure_over(mixed_over, look))
         elif now.get(MARK) in SURFACES:
-            slot.material = ensure_material(own)
+            slot.material = ensure_material(look)
         elif over_theirs and now.get(MARK) is None:
-            slot.material = ensure_over(now, own)
+            slot.material = ensure_over(now, look)
 
 
 def _writable_slots(obj: bpy.types.Object) -> Iterator[Any]:

@@ -34,7 +34,6 @@ def are_undone(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     vertices : (V, 3) float array
         Undisturbed world positions of the vertices of its mesh [m].
     moved : (K,) int array

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.variation import CHANNELS
+from ...core.numerics.arrays import Array
 from ..properties import SoftGroundPainted
-
-Array = NDArray[np.float64]
 
 _SETTINGS = dict(zip(CHANNELS, ("stiffness", "layer_depth", "rim"), strict=True))
 """The setting that names what each channel is painted with."""
@@ -22,7 +20,7 @@ Names = tuple[str, ...]
 
 
 def names_of(ground: bpy.types.Object, painted: Sequence[str]) -> Names:
-    """Which of the names that were chosen, in the order of `CHANNELS`, the mesh of a ground is painted with.
+    """The chosen names, in the order of `CHANNELS`, that the mesh of a ground is painted with.
 
     Raises
     ------
@@ -63,7 +61,6 @@ def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Arr
         Whose vertex groups they are.
     mesh : bpy.types.Mesh
         Its own mesh, or the evaluated one.
-    names : Names
 
     Returns
     -------

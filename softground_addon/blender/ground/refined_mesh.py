@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.refinement import Refinement, Surface
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import own_data
 from ..settings import found
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LAYOUT = {
     "FLOAT": ("value", 1, np.float32),
@@ -78,7 +76,6 @@ class Carried:
     positions : (V, 3) float32 array
     edges, loose_edges : (E, 2) int array
         Vertices of its edges if attributes are on them, and of those without a face, which no face would bring back.
-    layers : tuple of _Layer
     uv_maps : tuple of (str, bool, bool)
         Name of each, and whether it is active, and rendered.
     colours : dict of str to str
@@ -101,7 +98,7 @@ class Carried:
 
 def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
     """What a mesh carries; `groups` are the names of its vertex groups."""
-    coming = [one for one in source.attributes if one.data_type in LAYOUT and _comes_along(one.name)]
+    coming = [given for given in source.attributes if given.data_type in LAYOUT and _comes_along(given.name)]
     edges, loose = _EMPTY, np.ones(len(source.edges), dtype=bool)
     if len(source.loops):
         loose[_values(source.attributes[".corner_edge"])] = False  # a hundred times faster than `loops`
@@ -118,7 +115,7 @@ def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
         positions=mesh_arrays.positions(source),
         edges=edges,
         loose_edges=edges[loose] if loose.any() else _EMPTY,
-        layers=tuple(_Layer(one.name, one.data_type, one.domain, _values(one)) for one in coming),
+        layers=tuple(_Layer(given.name, given.data_type, given.domain, _values(given)) for given in coming),
         uv_maps=tuple((layer.name, bool(layer.active), bool(layer.active_render)) for layer in source.uv_layers),
         colours={choice: colours[index].name for choice, index in chosen.items() if 0 <= index < len(colours)},
         groups=tuple(groups),
@@ -133,7 +130,6 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
 
     Parameters
     ----------
-    name : ObjectName
     carried : Carried
         Of the source.
     surface : Surface
@@ -231,7 +227,7 @@ def _edge_keys(edges: Indices, size: int) -> Indices:
 
 
 def _copy_choices(mesh: bpy.types.Mesh, carried: Carried) -> None:
-    """Which UV map and colours are active and rendered."""
+    """Make the same UV map and colours active and rendered."""
     for name, active, active_render in carried.uv_maps:
         copy: Any = mesh.uv_layers.get(name)
         if copy is not None:

@@ -1,4 +1,4 @@
-"""Whether a ground stands still: what moves it, and what gives it another shape from frame to frame."""
+"""Grounds that do not stand still: what moves them, and what gives them another shape from frame to frame."""
 
 from __future__ import annotations
 

@@ -100,8 +100,8 @@ def draft(drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinem
 
 
 def _discard_unpublished(drafted: ObjectName) -> None:
-    if (left := find(drafted)) is not None and DETAIL_OF not in left.keys():  # noqa: SIM118  (an ID is no mapping)
-        ground_mesh.discard(left)
+    if (remaining := find(drafted)) is not None and DETAIL_OF not in remaining.keys():  # noqa: SIM118  (an ID is no mapping)
+        ground_mesh.discard(remaining)
 
 
 def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:

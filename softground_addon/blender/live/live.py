@@ -42,9 +42,9 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
         forget()
 
 
-def in_contact(scene: bpy.types.Scene) -> Contact | None:
-    """Cells in contact at the frame that is shown; None if live mode is not on there."""
-    if state.live is None or state.live.scene != scene.session_uid:
+def in_contact(uid: int) -> Contact | None:
+    """Cells in contact at the frame that is shown; None if live mode is not on in the scene of that session uid."""
+    if state.live is None or state.live.scene != uid:
         return None
     return state.live.in_contact()
 

@@ -129,8 +129,6 @@ class LiveGround:
 
         Parameters
         ----------
-        ground : bpy.types.Object
-        playhead : Playhead
         windows : sequence of Window
             Where its ground may have changed.
         sigma : float

@@ -46,14 +46,12 @@ class LiveMode:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     wanted : BakeSettings
         With its ground.
     known : analysis.Analysis
         Of its shot.
     ground : LiveGround
         Shows `playhead`.
-    playhead : Playhead
     """
 
     def __init__(
@@ -118,7 +116,6 @@ class LiveMode:
 
         Parameters
         ----------
-        scene : bpy.types.Scene
         seconds : float
             Of the processor [s]: where other programs take their share of it, Blender draws no oftener for that.
 
@@ -264,7 +261,7 @@ class LiveMode:
         )
         with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
             made_with = with_shoe_treads(made_with, shot.motions)
-        movers, name = staleness.of_movers(scene, made_with), settings.name_of(ground)
+        movers, name = staleness.of_movers(scene.objects, made_with), settings.name_of(ground)
         footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
         if made_with.carves and any(map(is_deep, footprints)):
             made_with = replace(made_with, carve=False)  # live mode carves nothing

@@ -58,10 +58,16 @@ class Look:
 
 
 def snow(graph: Graph, ground: Ground) -> Look:
-    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish, its edge breaks."""
+    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish, its edge breaks.
+
+    Walls break off and are as white as open snow: relief sets them beside what is pressed, whose border would cross
+    them.
+    """
+    up = graph.out(graph.node("ShaderNodeSeparateXYZ", {0: ground.normal}), 2)
+    pressed = graph.ramp(up, 0.5, 0.85, 0.0, ground.pressed)
     drifts = graph.noise(ground.place, 0.13, 2.0) * 0.012
-    clumps = graph.swing(ground.place, 0.014, 3.0, 0.6) * graph.blend(ground.pressed, 0.0045, 0.0012)
-    crystals = graph.swing(ground.place, 0.0030, 3.0, 0.65) * graph.blend(ground.pressed, 0.0018, 0.0008)
+    clumps = graph.swing(ground.place, 0.014, 3.0, 0.6) * graph.blend(pressed, 0.0045, 0.0012)
+    crystals = graph.swing(ground.place, 0.0030, 3.0, 0.65) * graph.blend(pressed, 0.0018, 0.0008)
     broken = graph.swing(ground.place, 0.009, 3.0, 0.7) * ground.edge * 0.009
 
     glints = graph.cells(ground.place, 0.0016)
@@ -77,12 +83,12 @@ def snow(graph: Graph, ground: Ground) -> Look:
     return Look(
         drifts + clumps + crystals + broken + ground.tread,
         {
-            "Base Color": graph.mix(ground.pressed, (0.915, 0.935, 0.96), (0.80, 0.875, 0.955)),
-            "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
+            "Base Color": graph.mix(pressed, (0.915, 0.935, 0.96), (0.80, 0.875, 0.955)),
+            "Roughness": graph.blend(pressed, 0.70, 0.45),
             "Subsurface Weight": 0.65,
             "Subsurface Radius": (0.5, 0.8, 1.0),
             "Subsurface Scale": 0.007,
-            "Coat Weight": seen * graph.blend(ground.pressed, 1.0, 0.2),
+            "Coat Weight": seen * graph.blend(pressed, 1.0, 0.2),
             "Coat Roughness": 0.10,
             "Coat Normal": graph.out(facet),
         },
@@ -107,14 +113,14 @@ def _ripples(graph: Graph, ground: Ground) -> Socket:
     phase = graph.math("FRACT", along, 0.0)
     wave = graph.ramp(phase, 0.0, LEE) * graph.ramp(phase, LEE, 1.0, 1.0, 0.0)
     patches = graph.ramp(graph.noise(ground.place, 2.5, 2.0), 0.38, 0.58, 0.25, 1.0)
-    left = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
-    return wave * patches * left * RIPPLE_HEIGHT
+    untouched = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
+    return wave * patches * untouched * RIPPLE_HEIGHT
 
 
 def dry_sand(graph: Graph, ground: Ground) -> Look:
     """Fine grains of several colours; nothing shines. Sand runs together over most of a tread."""
-    left = graph.ramp(graph.noise(ground.place, RUN_TOGETHER, 2.0, 0.6), 0.46, 0.66)
-    relief, tint = _grains(graph, replace(ground, tread=ground.tread * left))
+    remaining = graph.ramp(graph.noise(ground.place, RUN_TOGETHER, 2.0, 0.6), 0.46, 0.66)
+    relief, tint = _grains(graph, replace(ground, tread=ground.tread * remaining))
     relief = relief + _ripples(graph, ground)
     patches = graph.noise(ground.place, 0.25, 3.0)
     colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))

@@ -1,4 +1,4 @@
-"""How weather shows on the add-on's materials: new snow over all, rain dark, sun pale, and water level and smooth.
+"""Weather on the add-on's materials: new snow over all, rain dark, sun pale, and water level and smooth.
 
 Where a mesh has no weather its attributes are 0, and every surface is as without it.
 """
@@ -28,7 +28,7 @@ FILM = 0.07
 
 
 def bare(graph: Graph) -> Socket:
-    """How much of the ground neither new snow has covered nor wind, 1 to 0."""
+    """Share of the ground that neither new snow nor wind has covered, 1 to 0."""
     return graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", graph.attribute(FRESH), graph.attribute(BLOWN)))
 
 

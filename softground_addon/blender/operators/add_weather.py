@@ -39,16 +39,13 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         if session.current().is_live:
             raise InputError("Live mode is on, and weather acts on prints that stay: press Keep, then add weather.")
-        ground_checks.check_playable(baked_ground.display_mesh_of(scene.softground.ground))
-        return _added(scene, "" if self.preset == NONE else self.preset)
-
-
-def _added(scene: bpy.types.Scene, preset: str) -> jobs.Job[Reports]:
-    is_new = weather_result.modifier_of(scene) is None
-    yield from weather.adding(scene.softground.ground, preset=preset)
-    if is_new and not preset:
-        weather_result.set_hours(scene, weather_result.NIGHT)
-    return []
+        ground = scene.softground.ground
+        ground_checks.check_playable(baked_ground.display_mesh_of(ground))
+        is_new, preset = weather_result.modifier_of(ground) is None, "" if self.preset == NONE else self.preset
+        yield from weather.adding(ground, preset=preset)
+        if is_new and not preset:
+            weather_result.set_hours(scene, weather_result.NIGHT)
+        return []
 
 
 class SOFTGROUND_OT_remove_weather(bpy.types.Operator):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -11,10 +12,10 @@ import bpy
 from ...core.composers.responses import NOTICEABLE_GAP_MM
 from .. import session, settings
 from ..baking import bake_report
+from ..characters.character_setup import title_of
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
 from ..translation import translated
-from . import remedies
 
 
 def draw(layout: Any, options: Any, summary: Any) -> None:
@@ -22,7 +23,7 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
     _result(layout, summary)
     warnings = ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground))
     _warnings(layout, warnings)
-    remedies.draw(layout.column(align=True), options.id_data, warnings, session.current().stale)
+    draw_remedies(layout.column(align=True), options, warnings, session.current().stale)
     _floating_feet(layout, options, summary)
 
 
@@ -65,35 +66,82 @@ class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
     @classmethod
     def description(cls, context: bpy.types.Context, _properties: Any) -> str:
         """The warnings themselves."""
-        return "\n".join(warnings_of(settings.scene_of(context)))
+        return "\n".join(warnings_of(settings.scene_of(context).softground.ground))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for warning in warnings_of(settings.scene_of(context)):
+        for warning in warnings_of(settings.scene_of(context).softground.ground):
             self.report({"WARNING"}, warning)
         return {"FINISHED"}
 
 
 def _draw_warnings(menu: Any, context: bpy.types.Context) -> None:
     """One after the other, in lines that fit on a screen."""
-    for warning in warnings_of(settings.scene_of(context)):
+    for warning in warnings_of(settings.scene_of(context).softground.ground):
         column = menu.layout.column()
         for line in textwrap.wrap(warning, _WARNING_WIDTH):
             column.label(text=line, translate=False)
-        remedies.draw(column, settings.scene_of(context), [warning])
+        draw_remedies(column, settings.scene_of(context).softground, [warning])
 
 
 _WARNING_WIDTH = 90
 """Letters in a line of a warning."""
 
 
-def warnings_of(scene: bpy.types.Scene) -> list[str]:
+def warnings_of(ground: bpy.types.Object | None) -> list[str]:
     """Findings on the bake on the scene's ground."""
-    ground = scene.softground.ground
     return ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if ground else []
+
+
+_OF_CHARACTER = {"Walk Ahead": "softground.walk_ahead", r"Scale by ([\d.]*\d)": "softground.fix_scale"}
+"""Operators on the character that a warning names, by what it calls their buttons."""
+
+_OPERATORS = {
+    "Use Selected": "softground.use_as_ground",
+    "Add Contact": "softground.add_contact",
+    "Reset All Steps": "softground.reset_steps",
+    "[Cc]lear the [Bb]ake": "softground.clear_bake",
+    "[Cc]reate the [Gg]round": "softground.create_ground",
+}
+
+_FIELDS = {"cell size": "cell_size", "set Detail": "detail", "switch Sink Feet off": "sink_feet"}
+"""Settings of the scene, by the words for them."""
+
+
+def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: str = "") -> None:
+    """Show each remedy once, but for those of characters that are named among what has `changed` since the bake."""
+    layout.operator_context = "INVOKE_DEFAULT"  # which is another one in a popup
+    for character in options.characters:
+        name = f"'{title_of(character)}'"
+        text = "" if name in changed else "\n".join(warning for warning in warnings if name in warning)
+        for words, operator in _OF_CHARACTER.items():
+            if match := re.search(words, text):
+                layout.operator(operator, text=_button(match), translate=False).character = title_of(character)
+        if "Set Mass" in text:
+            layout.prop(character, "mass")
+    text = "\n".join(warnings)
+    listed = {item.object.name for item in options.hard_grounds if item.object}
+    for name in dict.fromkeys(re.findall(r"Press Add '([^']+)'", text)):
+        if name not in listed:
+            layout.operator(
+                "softground.add_hard_ground", text=translated("Add '{name}'", name=name), translate=False
+            ).object = name
+    for words, operator in _OPERATORS.items():
+        if re.search(words, text):
+            button = layout.operator(operator)
+            if operator == "softground.create_ground":
+                button.use_selected = False
+    for words, field in _FIELDS.items():
+        if words in text:
+            layout.prop(options, field)
+
+
+def _button(match: re.Match[str]) -> str:
+    """What a warning calls a button, in the language of the interface."""
+    return translated("Scale by {factor}", factor=match[1]) if match.lastindex else translated(match[0])
 
 
 CLASSES = (SOFTGROUND_OT_show_warnings,)

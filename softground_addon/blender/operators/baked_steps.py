@@ -156,17 +156,12 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
     return shown
 
 
-def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
+def of(ground: bpy.types.Object | None) -> Sequence[BakedStep]:
     """The steps of the bake on the scene's ground, in their order; none where there is no bake that can be read."""
-    return bake_on(scene.softground.ground).steps
+    return bake_on(ground).steps
 
 
-def active(scene: bpy.types.Scene) -> BakedStep | None:
-    """The step that is chosen; of several, the one that the panel shows."""
-    return next(iter(chosen(scene)), None)
-
-
-def chosen(scene: bpy.types.Scene) -> list[BakedStep]:
+def chosen(ground: bpy.types.Object | None) -> list[BakedStep]:
     """All steps that are chosen, first the one that the panel shows."""
-    steps = {step.name: step for step in of(scene)}
+    steps = {step.name: step for step in of(ground)}
     return [steps[name] for name in session.chosen_steps() if name in steps]

@@ -18,21 +18,17 @@ from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
 from ..translation import translated
 from .modal_job import Reading, Reports
+from .panel_base import chosen_of, remove_chosen
 
 
 def active_character(options: Any) -> Any:
     """The character that is chosen in the list, or None."""
-    if 0 <= options.active_character < len(options.characters):
-        return options.characters[options.active_character]
-    return None
+    return chosen_of(options, "characters", "active_character")
 
 
 def active_sole(options: Any) -> Any:
     """The sole that is chosen in the list of the active character, or None."""
-    character = active_character(options)
-    if character and 0 <= character.active_sole < len(character.soles):
-        return character.soles[character.active_sole]
-    return None
+    return chosen_of(active_character(options), "soles", "active_sole")
 
 
 class _OnCharacter:
@@ -76,9 +72,7 @@ class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        options = settings.options_of(context)
-        options.characters.remove(options.active_character)
-        options.active_character = max(0, min(options.active_character, len(options.characters) - 1))
+        remove_chosen(settings.options_of(context), "characters", "active_character")
         return {"FINISHED"}
 
 
@@ -146,18 +140,15 @@ class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
     bl_label = "Walk Ahead"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        return _walking_ahead(scene, self.chosen(scene.softground))
-
-
-def _walking_ahead(scene: bpy.types.Scene, character: Any) -> jobs.Job[Reports]:
-    name, mover = character_setup.title_of(character), character.armature or character.body
-    rig = mover and settings.name_of(mover)
-    known = yield from analysis.reading(scene)
-    belt = known.belts.get(name)
-    if belt is None or rig is None:
-        raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
-    walk_ahead(scene, settings.found(rig), -belt)
-    return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
+        character = self.chosen(scene.softground)
+        name, mover = character_setup.title_of(character), character.armature or character.body
+        rig = mover and settings.name_of(mover)
+        known = yield from analysis.reading(scene)
+        belt = known.belts.get(name)
+        if belt is None or rig is None:
+            raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
+        walk_ahead(scene, settings.found(rig), -belt)
+        return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
 class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
@@ -202,7 +193,7 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             props = [obj for obj in context.selected_objects if all(obj != item.armature for item in characters)]
             wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene.softground)
-            added = contact_editing.add_object_contacts(scene, character, props)
+            added = contact_editing.add_object_contacts(scene.softground, character, props)
         name = character_setup.title_of(character)
         self.report({"INFO"}, translated("'{name}' also prints with {parts}", name=name, parts=", ".join(added)))
         return {"FINISHED"}
@@ -240,9 +231,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        character = active_character(settings.options_of(context))
-        character.soles.remove(character.active_sole)
-        character.active_sole = max(0, min(character.active_sole, len(character.soles) - 1))
+        remove_chosen(active_character(settings.options_of(context)), "soles", "active_sole")
         return {"FINISHED"}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 
 import bpy
 import numpy as np
@@ -11,7 +10,6 @@ from bpy.props import EnumProperty
 
 from ...core.errors import InputError
 from ...core.plants.tramplings import tramplings
-from ...core.settings import SceneUnits
 from .. import mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..operator_base import reports_errors
@@ -60,14 +58,10 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
         with damage_named(ground):
             units = baked_ground.units_of(about["inputs"])
         trampling_table.ensure(ground)
-        scene_units = SceneUnits(**{name: units[name] for name in _UNITS})
-        trampled_ground.write(ground, tramplings(footprints), scene_units)
+        trampled_ground.write(ground, tramplings(footprints), units)
     table = trampling_table.ensure(ground)
     for obj in chosen:
         give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
-
-
-_UNITS = [field.name for field in fields(SceneUnits)]
 
 
 def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
@@ -75,7 +69,7 @@ def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
     if obj.type not in give_way.SCATTERS:
         return False
     is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
-    return not is_ground or any(one.type == "NODES" for one in ground_mesh.users_modifiers(obj))
+    return not is_ground or any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
 
 
 class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):

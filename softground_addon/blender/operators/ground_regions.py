@@ -30,7 +30,7 @@ def _choices(_operator: Any, _context: bpy.types.Context | None) -> list[tuple[s
         (HARD, "Hard Floor", "It bears and takes no print: stone, concrete, a deck"),
     ]
     for section, title in presets.SECTIONS.items():
-        items += _rows(title, ours, presets.soft_to_firm(one for one in ours if one.section == section))
+        items += _rows(title, ours, presets.soft_to_firm(each for each in ours if each.section == section))
     state.preset_choices = items + (_rows("Your Own", yours, yours) if yours else [])
     return state.preset_choices
 

@@ -10,6 +10,7 @@ from .. import settings
 from ..ground import ground_checks
 from ..operator_base import reports_errors
 from ..translation import translated
+from .panel_base import chosen_of, remove_chosen
 
 
 class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
@@ -54,13 +55,10 @@ class SOFTGROUND_OT_remove_hard_ground(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether an object is chosen in the list."""
-        options = settings.options_of(context)
-        return 0 <= options.active_hard_ground < len(options.hard_grounds)
+        return chosen_of(settings.options_of(context), "hard_grounds", "active_hard_ground") is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        options = settings.options_of(context)
-        options.hard_grounds.remove(options.active_hard_ground)
-        options.active_hard_ground = max(0, min(options.active_hard_ground, len(options.hard_grounds) - 1))
+        remove_chosen(settings.options_of(context), "hard_grounds", "active_hard_ground")
         return {"FINISHED"}
 
 

@@ -53,8 +53,13 @@ class SOFTGROUND_OT_live(ModalJob):
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[live_mode.LiveMode | None]:
         if state.live is None:
-            return live_start.starting(scene)
-        return _ended(state.live, state.live.current_scene() or scene, keep=self.keep)
+            return (yield from live_start.starting(scene))
+        if self.keep:
+            yield from state.live.keeping(state.live.current_scene() or scene)
+            live.forget()
+        else:
+            live.discard()
+        return None
 
     def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
         return nullcontext() if state.live is None else analysis.own_changes(state.live.current_scene() or scene)
@@ -63,15 +68,6 @@ class SOFTGROUND_OT_live(ModalJob):
         if result is not None:
             live.begin(result)
         session.redraw()
-
-
-def _ended(mode: live_mode.LiveMode, scene: bpy.types.Scene, *, keep: bool) -> jobs.Job[None]:
-    """End live mode, with or without its prints."""
-    if keep:
-        yield from mode.keeping(scene)
-        live.forget()
-    else:
-        live.discard()
 
 
 def _why_not(context: bpy.types.Context) -> str:

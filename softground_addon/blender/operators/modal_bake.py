@@ -65,7 +65,7 @@ class _BakeFootprints(_Pressing):
             if bpy.app.background:
                 text = translated("{summary}. Press Play to see them", summary=text)
             else:  # the ground would look as it did before
-                scene.frame_set(show_prints.last_step(scene))
+                scene.frame_set(show_prints.last_step(scene.softground))
         if steps and self._is_first:
             show_prints.show_first(scene, bpy.context.area)
         self.report({"INFO"}, text)

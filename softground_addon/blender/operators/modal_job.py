@@ -109,7 +109,7 @@ class ModalJob(bpy.types.Operator):
         except StopIteration as finished:  # done at once, as with a shot that is known
             self._show(finished.value)
             return {"FINISHED"}
-        self._needed = _needed_by_job(scene) | _named(_parts_of_bodies(scene))
+        self._needed = _needed_by_job(scene) | _named(_parts_of_bodies(scene.softground))
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
@@ -200,10 +200,10 @@ class ModalJob(bpy.types.Operator):
     def _show_progress(self, progress: jobs.Progress) -> None:
         done = max(session.current().progress, self._done(progress))
         passed = time.perf_counter() - self._started
-        left = passed * (1.0 - done) / max(done, 1e-3)
+        remaining = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
         stage = translated(self.stage_names[progress.stage])
-        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(left))))
+        self._show_status(done, translated("{stage}: {time} s left", stage=stage, time=max(1, round(remaining))))
 
     def _show_status(self, progress: float, status: str) -> None:
         label, end = translated(self.bl_label), translated("[Esc] Cancel")
@@ -319,14 +319,9 @@ def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
     return _named((scene, options.ground, *rigs, *soles))
 
 
-def _parts_of_bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def _parts_of_bodies(options: Any) -> list[bpy.types.Object]:
     """What bodies without an armature are made of; to find it, Blender goes through all objects of the file."""
-    return [
-        part
-        for character in scene.softground.characters
-        if character.body
-        for part in character.body.children_recursive
-    ]
+    return [part for character in options.characters if character.body for part in character.body.children_recursive]
 
 
 def _named(blocks: Iterable[bpy.types.ID | None]) -> dict[int, str]:

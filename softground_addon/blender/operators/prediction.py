@@ -72,9 +72,8 @@ def asked(scene: bpy.types.Scene) -> BakeSettings:
     return _look(scene)[0]
 
 
-def fineness(scene: bpy.types.Scene, predicted: DepthPrediction) -> Fineness:
+def fineness(wanted: BakeSettings, predicted: DepthPrediction) -> Fineness:
     """Fineness of the bake to come, with what legs will carve at the depth to expect."""
-    wanted = asked(scene)
     length = shortest_sole([character.motion for character in predicted.analysis.loads])
     return replace(wanted.fineness, is_carved=wanted.carves and bool(wading(predicted.depth or 0.0, length) > 0))
 
@@ -92,27 +91,27 @@ def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]
             bpy.app.timers.register(look_anew, persistent=True)
     if scene.session_uid not in state.seen:
         wanted = settings.snapshot(scene)
-        state.seen[scene.session_uid] = wanted, _prediction(scene, wanted)
+        state.seen[scene.session_uid] = wanted, _prediction(scene.session_uid, analysis.known(scene, wanted), wanted)
     seen: tuple[BakeSettings, DepthPrediction | None] = state.seen[scene.session_uid]
     return seen
 
 
-def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction | None:
-    known = analysis.known(scene, wanted)
+def _prediction(uid: int, known: Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
+    """The prediction for the scene of a session uid, by what is known of its shot."""
     if known is None:
         return None
     depth = analysis.known_depth(known, wanted)
     if depth is None:
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)
-        return DepthPrediction(known, state.told.get(scene.session_uid), is_current=False)
-    state.told[scene.session_uid] = depth
+        return DepthPrediction(known, state.shown_depths.get(uid), is_current=False)
+    state.shown_depths[uid] = depth
     return DepthPrediction(known, depth, is_current=True)
 
 
 def shown_cm(scene: bpy.types.Scene) -> float:
-    """The depth that the scene was told last [cm]; 0 before."""
-    return (state.told.get(scene.session_uid) or 0.0) * 100
+    """The depth that was shown last for a scene [cm]; 0 before."""
+    return (state.shown_depths.get(scene.session_uid) or 0.0) * 100
 
 
 def type_cm(scene: bpy.types.Scene, depth: float) -> None:
@@ -123,11 +122,11 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     if not depth > 0:
         return
     try:
-        known = analysis.read(scene) if bpy.app.background else analysis.current(scene)
+        known = analysis.read(scene) if bpy.app.background else jobs.run(analysis.refreshing(scene))
         if known is None:
             return
         wanted = settings.snapshot(scene)
-        if bpy.app.background or depth / 100 > wanted.material.deepest or not state.told.get(scene.session_uid):
+        if bpy.app.background or depth / 100 > wanted.material.deepest or not state.shown_depths.get(scene.session_uid):
             modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
             scene.softground.material.youngs_modulus = modulus
         else:
@@ -146,21 +145,18 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     """
     material = scene.softground.material
     law = settings.snapshot(scene).material
-    material.youngs_modulus = next_modulus([(material.youngs_modulus, state.told[scene.session_uid])], depth, law)
-    state.told[scene.session_uid] = depth
+    material.youngs_modulus = next_modulus(
+        [(material.youngs_modulus, state.shown_depths[scene.session_uid])], depth, law
+    )
+    state.shown_depths[scene.session_uid] = depth
     state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
-
-
-def _aim_of(scene: bpy.types.Scene) -> _Aim | None:
-    """The depth that was typed last, taken away; None where the stiffness was set otherwise since."""
-    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
-    return aim if aim and scene.softground.material.youngs_modulus == aim.modulus else None
 
 
 def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
     """Set the stiffness for the depth that was typed last, unless it is set otherwise meanwhile."""
-    aim, known = _aim_of(scene), analysis.known(scene)
-    if aim is None or known is None:
+    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
+    known, material = analysis.known(scene), scene.softground.material
+    if aim is None or known is None or material.youngs_modulus != aim.modulus:
         return
     wanted = settings.snapshot(scene)
     search = matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)

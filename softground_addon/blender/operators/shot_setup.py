@@ -13,9 +13,8 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import ground_presets, jobs, session, settings
+from .. import ground_presets, jobs, kept, session, settings
 from ..animation_layer.constraint_layer import LayerKind
-from ..baking import shot_prints
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
@@ -94,7 +93,7 @@ def _add(
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", translated("Added '{name}' with {soles}", name=character.name, soles=soles)))
-        elif is_animated(character.armature) and meshes_on(scene, character.armature):
+        elif is_animated(character.armature) and meshes_on(scene.objects, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
         else:
@@ -168,23 +167,19 @@ class SOFTGROUND_OT_create_ground(Reading):
         if self.use_selected:
             _check_no_instance(bpy.context)
             if chosen := _selected_ground(bpy.context):
-                return _taken_as_ground(scene, chosen)
-        return _created(scene)
-
-
-def _created(scene: bpy.types.Scene) -> jobs.Job[Reports]:
-    wanted = shots.settings_of(scene)
-    plan = yield from shots.fit_ground(scene, wanted)
-    with ExitStack() as drafts:
-        creating = created_ground.created(drafts, wanted, plan)
-        name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
-        ground = settings.found(name)
-        with analysis.own_changes(scene):
-            created_ground.publish(scene, ground, wanted.surface)
-    created_ground.select(scene, ground)
-    count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
-    text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
-    return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
+                return (yield from _taken_as_ground(scene, chosen))
+        wanted = shots.settings_of(scene)
+        plan = yield from shots.fit_ground(scene, wanted)
+        with ExitStack() as drafts:
+            creating = created_ground.created(drafts, wanted, plan)
+            name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
+            ground = settings.found(name)
+            with analysis.own_changes(scene):
+                created_ground.publish(scene, ground, wanted.surface)
+        created_ground.select(scene, ground)
+        count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
+        text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
+        return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
 
 
 def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -237,7 +232,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        shot_prints.forget()
+        kept.forget()
         with analysis.own_changes(scene):
             if ground is not None:
                 if baked_ground.has_remains(ground):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, pi, radians
 from typing import Any
 
@@ -32,10 +33,10 @@ DEFAULT_LIGHT, LOW_SUN = "Default", "outdoor.sl"
 """Studio lights of Blender: the one it starts with, and one whose sun is low."""
 
 
-def last_step(scene: bpy.types.Scene) -> int:
+def last_step(options: Any) -> int:
     """The frame from which on all prints of the bake on the scene's ground are there."""
-    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(scene.softground.ground))
-    return ceil(summary.get(bake_report.LAST_FRAME) or scene.softground.frame_end)
+    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground))
+    return ceil(summary.get(bake_report.LAST_FRAME) or options.frame_end)
 
 
 def is_first_bake(scene: bpy.types.Scene) -> bool:
@@ -48,7 +49,7 @@ def show_first(scene: bpy.types.Scene, area: Any) -> None:
     """Show the prints of a first bake in an area, if its view is free."""
     state.seen_prints.add(scene.session_uid)
     if is_free(area):
-        _show(scene, area, area.spaces.active)
+        _show(_last_prints(scene.softground.ground, scene.frame_current), area, scene.unit_settings.scale_length)
 
 
 def is_free(area: Any) -> bool:
@@ -57,11 +58,11 @@ def is_free(area: Any) -> bool:
     return bool(space and space.region_3d.view_perspective == "PERSP" and not space.local_view)
 
 
-def centre(scene: bpy.types.Scene, area: Any, step: BakedStep) -> None:
+def centre(unit_scale: float, area: Any, step: BakedStep) -> None:
     """Move the middle of the view in an area to a step; the view through a camera stays."""
     space = _viewport(area)
     if space and space.region_3d.view_perspective != "CAMERA":
-        space.region_3d.view_location = Vector(_middle(step).tolist()) / scene.unit_settings.scale_length
+        space.region_3d.view_location = Vector(_middle(step).tolist()) / unit_scale
 
 
 def _viewport(area: Any) -> Any:
@@ -72,9 +73,9 @@ def _viewport(area: Any) -> Any:
     return None if space.region_quadviews or space.region_3d.lock_rotation else space
 
 
-def _last_prints(scene: bpy.types.Scene) -> list[BakedStep]:
-    """The last step that is in the ground at the scene's frame, and those next to it."""
-    visible = [step for step in baked_steps.of(scene) if step.left and step.there_from <= scene.frame_current]
+def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[BakedStep]:
+    """The last step that is in the ground at a frame, and those next to it."""
+    visible = [step for step in baked_steps.of(ground) if step.left and step.there_from <= frame]
     if not visible:
         return []
     last = max(visible, key=lambda step: step.there_from)
@@ -86,9 +87,9 @@ def _middle(step: BakedStep) -> NDArray[np.float64]:
     return step.outline().mean(axis=0)
 
 
-def _show(scene: bpy.types.Scene, area: Any, space: Any) -> None:
-    """Frame the last prints and light them."""
-    prints = _last_prints(scene)
+def _show(prints: Sequence[BakedStep], area: Any, unit_scale: float) -> None:
+    """Frame prints in an area, if there are any, and light them; `unit_scale` is that of their scene [m]."""
+    space = area.spaces.active
     if not prints:
         return
     points = np.concatenate([step.outline() for step in prints])
@@ -96,7 +97,7 @@ def _show(scene: bpy.types.Scene, area: Any, space: Any) -> None:
     width = np.ptp(prints[0].outline()[:, :2], axis=0).min()
     reach = min(float(np.linalg.norm(points - middle, axis=1).max()), LONGEST * float(width))
     look = (prints[0].left or prints[0].baked).heading + ASIDE
-    metre = 1.0 / scene.unit_settings.scale_length
+    metre = 1.0 / unit_scale
     view, distance = space.region_3d, DISTANCE * reach * metre * space.lens / 50.0
     view.view_perspective = "PERSP"
     turn(area, Vector(middle) * metre + Vector((0.0, 0.0, RAISED * distance)), look, distance)
@@ -144,9 +145,10 @@ class SOFTGROUND_OT_show_prints(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        scene.frame_set(last_step(scene))
-        if space := _viewport(context.area):
-            _show(scene, context.area, space)
+        scene.frame_set(last_step(scene.softground))
+        if _viewport(context.area):
+            prints = _last_prints(scene.softground.ground, scene.frame_current)
+            _show(prints, context.area, scene.unit_settings.scale_length)
         return {"FINISHED"}
 
 

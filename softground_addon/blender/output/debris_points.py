@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from .. import compat
+from .. import compat, settings
 from ..debris import debris_nodes as nodes
 from ..debris import debris_object
 from ..node_graph import NodeGraph
@@ -16,13 +16,11 @@ from ..node_modifiers import new_group
 
 
 @contextmanager
-def selected(scene: bpy.types.Scene, ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
-    """Debris of a ground's bake as a selected object of points, which is removed afterwards; none without debris.
+def selected(ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
+    """Debris of a ground's bake as a selected object of points of the open scene, which is removed afterwards.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    ground : bpy.types.Object
     clouds : bool
         True if the format takes point clouds, which have a `radius`. Else they are the vertices of a mesh.
     """
@@ -36,7 +34,7 @@ def selected(scene: bpy.types.Scene, ground: bpy.types.Object, *, clouds: bool) 
     try:
         modifier: Any = obj.modifiers.new(group.name, "NODES")
         modifier.node_group = group
-        scene.collection.objects.link(obj)
+        settings.scene_of(bpy.context).collection.objects.link(obj)
         obj.select_set(True)
         yield
     finally:

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import bpy
-
-from ...core.events import event_edl, event_json, event_midi, event_otio, event_reaper
+from ...core.events import event_files, event_midi
 from ...core.events.events import Event, between
 from ...core.files import files
-from .. import settings
-from ..ground import baked_ground
 
 Dump = Callable[[Sequence[Event], float], str | bytes]
 """Content of a file from events and frame rate [Hz]."""
@@ -21,7 +17,7 @@ KINDS: dict[str, tuple[str, str, str, Dump]] = {
         ".jsonl",
         "Events (JSON Lines)",
         "Heel strikes, toe-offs and slides, for game engines",
-        lambda table, rate: event_json.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.json_lines(table, frame_rate=rate),
     ),
     "EVENTS_MIDI": (
         ".mid",
@@ -33,33 +29,32 @@ KINDS: dict[str, tuple[str, str, str, Dump]] = {
         ".csv",
         "Events (Reaper)",
         "Regions and markers for Reaper",
-        lambda table, _rate: event_reaper.dump(table),
+        lambda table, _rate: event_files.reaper(table),
     ),
     "EVENTS_EDL": (
         ".edl",
         "Events (Resolve)",
         "Timeline markers for DaVinci Resolve",
-        lambda table, rate: event_edl.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.edl(table, frame_rate=rate),
     ),
     "EVENTS_OTIO": (
         ".otio",
         "Events (OpenTimelineIO)",
         "Timeline markers for editors",
-        lambda table, rate: event_otio.dump(table, frame_rate=rate),
+        lambda table, rate: event_files.otio(table, frame_rate=rate),
     ),
 }
 """Formats: suffix, label and description for the user, and the writer."""
 
 
-def write(scene: bpy.types.Scene, ground: bpy.types.Object, kind: str, path: Path, start: int, end: int) -> None:
-    """Write the events of some frames, times counted from the first.
+def write(table: Sequence[Event], frame_rate: float, kind: str, path: Path, start: int, end: int) -> None:
+    """Write the events of some frames, times counted from the first; `frame_rate` in Hz.
 
     Raises
     ------
-    InputError
-        If there is no bake or it has no events, or the file cannot be written.
+    OSError
+        If the file cannot be written.
     """
-    rate = settings.frame_rate_of(scene)
-    content = KINDS[kind][3](between(baked_ground.events_of(ground), start, end, rate), rate)
+    content = KINDS[kind][3](between(table, start, end, frame_rate), frame_rate)
     with files.replacing(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)

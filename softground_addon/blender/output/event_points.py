@@ -51,11 +51,10 @@ def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Obje
     return shown
 
 
-def add_markers(scene: bpy.types.Scene, table: Sequence[Event], kinds: set[str]) -> int:
-    """Put the events of some phases into the timeline, in place of those of an earlier bake; returns their number."""
+def add_markers(markers: Any, table: Sequence[Event], kinds: set[str]) -> int:
+    """Put the events of some phases into a timeline, in place of those of an earlier bake; returns their number."""
     ours = {f"{row['character']} {row['contact']} " for row in table}
     endings = tuple(kind.replace("_", " ") for kind in KINDS)
-    markers: Any = scene.timeline_markers
     for marker in list(markers):
         if marker.name.endswith(endings) and any(marker.name.startswith(prefix) for prefix in ours):
             markers.remove(marker)
@@ -122,7 +121,7 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        count = add_markers(settings.scene_of(context), _events(context), set(self.phases))
+        count = add_markers(settings.scene_of(context).timeline_markers, _events(context), set(self.phases))
         self.report({"INFO"}, translated("Marked {count} events", count=count))
         return {"FINISHED"}
 

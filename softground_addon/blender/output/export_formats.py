@@ -15,7 +15,9 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
+from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
+from ..reading import analysis
 from ..translation import translated
 from . import event_exports, exports, image_exports, opensim_exports, sound_exports
 
@@ -58,49 +60,58 @@ class Options:
     stereo: bool = False
 
 
-Writer = Callable[[bpy.types.Scene, bpy.types.Object, Options], list[Path]]
+Writer = Callable[[bpy.types.Object, Options], list[Path]]
+"""Writes a ground of the open scene; returns the files."""
 
 
-def _images(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+def _images(ground: bpy.types.Object, options: Options) -> list[Path]:
     return image_exports.export_images(
-        scene,
         ground,
         options.path.parent,
         options.start,
         options.end,
+        units=settings.units_of(settings.scene_of(bpy.context)),
         resolution=options.resolution,
         uv_map=options.uv_map,
         name=options.path.stem,
     )
 
 
-def _moving(write: Callable[[bpy.types.Scene, bpy.types.Object, Path, int, int], None]) -> Writer:
+def _moving(write: Callable[[bpy.types.Object, Path, int, int], None]) -> Writer:
     """A writer of one file that holds all frames."""
 
-    def writer(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
-        write(scene, ground, options.path, options.start, options.end)
+    def writer(ground: bpy.types.Object, options: Options) -> list[Path]:
+        write(ground, options.path, options.start, options.end)
         return [options.path]
 
     return writer
 
 
-def _still(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
-    exports.export_final(scene, ground, options.path)
+def _still(ground: bpy.types.Object, options: Options) -> list[Path]:
+    exports.export_final(ground, options.path)
     return [options.path]
 
 
-def _events(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
-    event_exports.write(scene, ground, options.format, options.path, options.start, options.end)
+def _events(ground: bpy.types.Object, options: Options) -> list[Path]:
+    rate = settings.frame_rate_of(settings.scene_of(bpy.context))
+    event_exports.write(baked_ground.events_of(ground), rate, options.format, options.path, options.start, options.end)
     return [options.path]
 
 
-def _opensim(scene: bpy.types.Scene, _ground: bpy.types.Object, options: Options) -> list[Path]:
-    return opensim_exports.write(scene, options.path, options.start, options.end)
+def _opensim(_ground: bpy.types.Object, options: Options) -> list[Path]:
+    loads = analysis.read(settings.scene_of(bpy.context)).loads
+    return opensim_exports.write(loads, options.path, options.start, options.end)
 
 
-def _sound(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+def _sound(ground: bpy.types.Object, options: Options) -> list[Path]:
     sound_exports.write(
-        scene, ground, options.path, options.start, options.end, samples=options.samples, stereo=options.stereo
+        settings.scene_of(bpy.context),
+        ground,
+        options.path,
+        options.start,
+        options.end,
+        samples=options.samples,
+        stereo=options.stereo,
     )
     return [options.path]
 
@@ -116,7 +127,7 @@ class Format:
     label, description : str
         For the user.
     write : callable
-        Writes a scene's baked ground with `Options`; returns the files.
+        Writes a baked ground of the open scene with `Options`; returns the files.
     built : bool
         False where the Blender that we run in was built without it, as those of some Linux distributions are.
     """
@@ -192,7 +203,7 @@ def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     is_open = scene == bpy.context.scene  # the one that Blender's exporters write
     in_scene = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
     with in_scene:
-        return FORMATS[options.format].write(scene, ground, options)
+        return FORMATS[options.format].write(ground, options)
 
 
 def with_suffix(path: Path, kind: str) -> Path:
@@ -218,9 +229,8 @@ def check_suffix(path: Path, kind: str) -> Path:
     return named
 
 
-def default_path(scene: bpy.types.Scene, kind: str) -> Path:
+def default_path(ground: bpy.types.Object | None, kind: str) -> Path:
     """A file beside the .blend, named after it and the ground."""
-    ground = scene.softground.ground
     return with_suffix(beside_file(bpy.path.clean_name(ground.name) if ground else "ground"), kind)
 
 
@@ -272,7 +282,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         scene = settings.scene_of(context)
         options = scene.softground
         self.frame_start, self.frame_end = options.frame_start, options.frame_end
-        self.filepath = str(default_path(scene, self.format))
+        self.filepath = str(default_path(options.ground, self.format))
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -313,7 +323,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         set_frames = self.properties.is_property_set("frame_start") or self.properties.is_property_set("frame_end")
         options = scene.softground
         start, end = (self.frame_start, self.frame_end) if set_frames else (options.frame_start, options.frame_end)
-        path = Path(bpy.path.abspath(self.filepath)) if self.filepath else default_path(scene, self.format)
+        path = Path(bpy.path.abspath(self.filepath)) if self.filepath else default_path(options.ground, self.format)
         path = with_suffix(path, self.format)
         written = export(
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
@@ -335,8 +345,7 @@ class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        still = exports.final_mesh(scene, scene.softground.ground)
+        still = exports.final_mesh(settings.options_of(context).ground)
         self.report({"INFO"}, translated("Added '{name}'", name=still.name))
         return {"FINISHED"}
 

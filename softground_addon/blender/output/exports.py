@@ -1,4 +1,7 @@
-"""A bake as a mesh for other programs: point cache, Alembic, USD, and the finished ground as it stands."""
+"""A bake as a mesh for other programs: point cache, Alembic, USD, and the finished ground as it stands.
+
+All write the open scene, as Blender's exporters do.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
+from .. import settings
 from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, ground_surface
@@ -28,7 +32,7 @@ BYTES_OF_A_POINT = 24
 """Size of a piece of debris in a frame of Alembic: place and velocity."""
 
 
-def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+def export_point_cache(ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
     """Write the positions of the ground that carries the bake as a PC2 cache, one sample per frame.
 
     Raises
@@ -36,7 +40,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     InputError
         If there is no bake, its record is damaged, or the file cannot be written.
     """
-    unit_scale = scene.unit_settings.scale_length
+    unit_scale = settings.scene_of(bpy.context).unit_settings.scale_length
     display_mesh = baked_display_mesh(ground)
     rest = ground_mesh.rest_positions(ground_mesh.mesh_of(display_mesh))
     moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
@@ -58,7 +62,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     point_cache.write(path, samples(), start_frame=start, points=len(rest), count=end - start + 1)
 
 
-def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+def export_alembic(ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
     """Write the ground that carries the bake, and its debris as points, as Alembic, with Blender's exporter.
 
     Raises
@@ -68,8 +72,8 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
     """
     display_mesh = baked_display_mesh(ground)
     with (
-        _only(scene, display_mesh, start, end, marks_object.of(ground)),
-        debris_points.selected(scene, ground, clouds=False),
+        _only(display_mesh, start, end, marks_object.of(ground)),
+        debris_points.selected(ground, clouds=False),
         replacing(path) as partial,
     ):
         shown = display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -104,7 +108,7 @@ def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
     return once + frames * (vector * (vertices + normals) + rest_of_frame)
 
 
-def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+def export_usd(ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
     """Write the ground that carries the bake, and its debris as points, as USD, with Blender's exporter.
 
     Raises
@@ -117,8 +121,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
             f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
         )
     with (
-        _only(scene, baked_display_mesh(ground), start, end, marks_object.of(ground)),
-        debris_points.selected(scene, ground, clouds=True),
+        _only(baked_display_mesh(ground), start, end, marks_object.of(ground)),
+        debris_points.selected(ground, clouds=True),
         replacing(path) as partial,
     ):
         options = {
@@ -133,8 +137,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
         _run(bpy.ops.wm.usd_export, partial, path, **options)
 
 
-def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Object:
-    """A new object with the ground as it stands at the end of the bake: a plain mesh, no modifiers or shape keys.
+def final_mesh(ground: bpy.types.Object) -> bpy.types.Object:
+    """A new object of the open scene: the ground as it stands at the end of the bake, without modifiers or shape keys.
 
     The mesh includes the user's modifiers, and the weather by the last frame of the scene, or of the bake if that is
     later.
@@ -150,7 +154,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(display_mesh))
     of_playing = own_data.made(mesh) & {own_data.REST, *own_data.OF_PLAYBACK, *own_data.OF_WEATHER}
     weather = weather_modifier.modifier_of(display_mesh)
-    last = _last_frame(scene, ground) if weather and weather.show_viewport else None
+    last = _last_frame(ground) if weather and weather.show_viewport else None
     if last is not None or any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
         with ground_surface.stand_in(display_mesh, mesh, weather_at=last) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
@@ -162,16 +166,16 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     for key in own_data.PROPERTIES:
         mesh.pop(key, None)
     still.matrix_world = Matrix(ground_surface.to_world_of(display_mesh, 1.0).tolist())
-    scene.collection.objects.link(still)
+    settings.scene_of(bpy.context).collection.objects.link(still)
     return still
 
 
-def _last_frame(scene: bpy.types.Scene, ground: bpy.types.Object) -> int:
-    """Last frame of the scene, or of the bake if that is later."""
-    return math.ceil(max(scene.frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
+def _last_frame(ground: bpy.types.Object) -> int:
+    """Last frame of the open scene, or of the bake if that is later."""
+    return math.ceil(max(settings.scene_of(bpy.context).frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
 
 
-def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -> None:
+def export_final(ground: bpy.types.Object, path: Path) -> None:
     """Write the ground as it stands at the end of the bake as Wavefront OBJ, with Blender's exporter.
 
     Raises
@@ -179,10 +183,10 @@ def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -
     InputError
         If there is no bake, or the file cannot be written.
     """
-    still = final_mesh(scene, ground)
+    still, scene = final_mesh(ground), settings.scene_of(bpy.context)
     mesh = ground_mesh.mesh_of(still)
     try:
-        with _only(scene, still, scene.frame_start, scene.frame_end), replacing(path) as partial:
+        with _only(still, scene.frame_start, scene.frame_end), replacing(path) as partial:
             _run(bpy.ops.wm.obj_export, partial, path, export_selected_objects=True, export_materials=False)
     finally:
         bpy.data.objects.remove(still)
@@ -205,11 +209,11 @@ def baked_display_mesh(ground: bpy.types.Object) -> bpy.types.Object:
 
 @contextmanager
 def _only(
-    scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, end: int, marks: bpy.types.Object | None = None
+    display_mesh: bpy.types.Object, start: int, end: int, marks: bpy.types.Object | None = None
 ) -> Iterator[None]:
     """An object as all that is selected, shown if it is hidden, with its marks if these are shown, and the frames as
-    the scene's; then all as before."""
-    layer = bpy.context.view_layer
+    those of the open scene; then all as before."""
+    scene, layer = settings.scene_of(bpy.context), bpy.context.view_layer
     layer.update()
     if display_mesh.name not in layer.objects:
         raise InputError(f"'{display_mesh.name}' is not in the current view layer: include its collection first.")

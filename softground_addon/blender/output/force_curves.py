@@ -11,21 +11,19 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, StringProperty
-from numpy.typing import NDArray
 
 from ...core.errors import SoftGroundError
 from ...core.files import files
 from ...core.loads.deviation import force_deviation
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
+from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
 from ..translation import translated
-
-Array = NDArray[np.float64]
 
 FORCE, CONTACT = "force", "contact"
 """Endings of the properties' names, after a sole's name."""
@@ -36,7 +34,6 @@ def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tup
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     frames : (N,) float array
 
     Returns
@@ -101,8 +98,6 @@ def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    footprints : sequence of Footprint
     frames : (N,) float array
         Scene frames; the keys are where those are shown if the scene's time is remapped.
 

@@ -20,7 +20,8 @@ from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
-from .. import mesh_arrays, settings
+from ...core.rig.recording import SceneUnits
+from .. import mesh_arrays
 from ..debris import debris_object
 from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
@@ -46,12 +47,12 @@ PROBES = 64
 
 
 def export_images(
-    scene: bpy.types.Scene,
     ground: bpy.types.Object,
     folder: Path,
     start: int,
     end: int,
     *,
+    units: SceneUnits,
     resolution: int = 2048,
     uv_map: str = "",
     name: str = "",
@@ -62,7 +63,6 @@ def export_images(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     ground : bpy.types.Object
         Its own UV map is used, also where the detail along the trail carries the bake.
     folder : Path
@@ -70,6 +70,8 @@ def export_images(
         `<name>_weather_<frame>.exr`, and of steps that throw `<name>_debris_<frame>.exr`.
     start, end : int
         First and last frame.
+    units : SceneUnits
+        Of the ground's scene.
     resolution : int
         Width and height [pixels].
     uv_map : str
@@ -86,10 +88,11 @@ def export_images(
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     reach = STRAY + 4 * (float(np.hypot(sigma, weathered_points.BLUR)) if weathered else sigma)
-    fallen = _fallen(scene, ground)
+    thrown = debris_object.of(ground)
+    fallen = debris_object.at_rest(thrown, units) if thrown is not None else None
     if fallen is not None:
         reach = max(reach, _farthest(footprints, fallen.place))
-    pixels = _pixels(scene, ground, footprints, reach, resolution, uv_map)
+    pixels = _pixels(ground, units.unit_scale_m, footprints, reach, resolution, uv_map)
     # Last comes a place that no footprint reaches: as it is, so is all the ground around.
     far = max(((each.window.column + each.window.columns) * each.cell_size for each in footprints), default=0.0)
     position = np.append(pixels.position, [(far + 2 * reach, 0.0, 0.0)], axis=0)
@@ -110,13 +113,11 @@ def export_images(
         image, at = open_.enter_context(_image(resolution)), None
         if weathered:
             water = water_at(relief, len(x))
-            points = weathered_points.weathered_points(
-                ground, position, over_time, water, scene.unit_settings.scale_length
-            )
+            points = weathered_points.weathered_points(ground, position, over_time, water, units.unit_scale_m)
             at = open_.enter_context(points)
         for frame in range(start, end + 1):
             height, compression = over_time.movement.at(frame, len(x)).T
-            rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), scene)
+            rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), units.frame_rate)
             kinds: dict[str, tuple[Array, ...]] = {}
             if at is not None:
                 now = at(frame, height, compression, rim)
@@ -124,7 +125,7 @@ def export_images(
                 kinds = {WEATHER: (now.wetness, now.fresh, now.water)}
             if fallout is not None:
                 thickness, cover, latest = fallout.at(frame)
-                since = np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
+                since = np.where(np.isfinite(latest), (frame - latest) / units.frame_rate, NEVER)
                 kinds |= {DEBRIS: (thickness, cover, since)}
             for kind, channels in {DISPLACEMENT: (height,) * 3, MASK: (compression, rim, age), **kinds}.items():
                 path = folder / f"{stem}_{kind}_{frame:04d}.exr"
@@ -140,17 +141,6 @@ def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:
     return (DISPLACEMENT, MASK, *((WEATHER,) if weathered else ()), *((DEBRIS,) if thrown else ()))
 
 
-def _fallen(scene: bpy.types.Scene, ground: bpy.types.Object) -> debris_object.AtRest | None:
-    """Debris at rest; None if steps threw nothing."""
-    obj = debris_object.of(ground)
-    if obj is None:
-        return None
-    units = settings.units_of(scene)
-    return debris_object.at_rest(
-        obj, frame_rate=units.frame_rate, time_stretch=units.time_stretch, unit_scale=units.unit_scale_m
-    )
-
-
 def _farthest(footprints: Sequence[Footprint], place: Array) -> float:
     """Largest distance of debris from the box around all footprints, `FARTHEST_FALLOUT` at most [m]."""
     if not footprints or not len(place):
@@ -160,17 +150,17 @@ def _farthest(footprints: Sequence[Footprint], place: Array) -> float:
     return float(np.clip(away[away <= FARTHEST_FALLOUT].max(initial=0.0) + FINEST_FALLOUT, 0.0, FARTHEST_FALLOUT))
 
 
-def _age(over_time: VertexHistories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
+def _age(over_time: VertexHistories, frame: float, points: int, frame_rate: float) -> Array:
     contacts = over_time.contacts
     latest = np.full(points, -np.inf)
     begun = contacts.start <= frame
     np.maximum.at(latest, contacts.point[begun], np.minimum(contacts.end[begun], frame))
-    return np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
+    return np.where(np.isfinite(latest), (frame - latest) / frame_rate, NEVER)
 
 
 def _pixels(
-    scene: bpy.types.Scene,
     ground: bpy.types.Object,
+    unit_scale: float,
     footprints: Sequence[Footprint],
     reach: float,
     resolution: int,
@@ -183,7 +173,7 @@ def _pixels(
         if layer is None:
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
-        to_world = ground_surface.to_world_of(ground, scene.unit_settings.scale_length)
+        to_world = ground_surface.to_world_of(ground, unit_scale)
         surface = refined_mesh.surface_of(mesh_arrays.read_faces(mesh), to_world)
         name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)

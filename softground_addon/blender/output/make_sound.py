@@ -19,9 +19,9 @@ STRIP = "SoftGround Footsteps"
 FILE = "footsteps.wav"
 
 
-def put_strip(scene: bpy.types.Scene, path: Path, frame: int) -> Any:
-    """A sound strip at a frame, on the channel of the one before, which it replaces, or else on the first free one."""
-    strips, older = compat.strips_of(scene), _strip(scene)
+def put_strip(strips: Any, path: Path, frame: int) -> Any:
+    """A sound strip at a frame, in the place of ours among these, else on the first free channel."""
+    older = _strip(strips)
     channel, volume = (older.channel, older.volume) if older else (_free_channel(strips), 1.0)
     if older:
         sound = older.sound
@@ -33,15 +33,14 @@ def put_strip(scene: bpy.types.Scene, path: Path, frame: int) -> Any:
     return strip
 
 
-def _strip(scene: bpy.types.Scene) -> Any:
+def _strip(strips: Any) -> Any:
     """The strip that was added before; None if there is none any more."""
-    strips = compat.strips_of(scene) if scene.sequence_editor else ()
     return next((strip for strip in strips if strip.type == "SOUND" and strip.name.startswith(STRIP)), None)
 
 
 def _is_others(scene: bpy.types.Scene, path: Path) -> bool:
     """True if there is a file that the strip which was added before does not play."""
-    strip = _strip(scene)
+    strip = _strip(compat.strips_of(scene) if scene.sequence_editor else ())
     played = Path(bpy.path.abspath(strip.sound.filepath)) if strip is not None and strip.sound else None
     return path.exists() and (played is None or files.identity(played) != files.identity(path))
 
@@ -104,7 +103,7 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
             stereo=self.stereo,
         )
         if compat.PLAYS_SOUND:
-            put_strip(scene, path, options.frame_start)
+            put_strip(compat.strips_of(scene), path, options.frame_start)
             compat.show_in_sequencer(context, scene)
         text = "Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}"
         self.report({"INFO"}, translated(text, path=path))

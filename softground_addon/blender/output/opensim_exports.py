@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import numpy as np
 from ...core.files import files, opensim
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
-from ..reading import analysis
 
 KINDS = {
     "OPENSIM_MOT": (
@@ -24,20 +24,19 @@ KINDS = {
 """Suffix, label and description of each kind of file."""
 
 
-def write(scene: bpy.types.Scene, path: Path, start: int, end: int) -> list[Path]:
+def write(loads: Sequence[CharacterLoads], path: Path, start: int, end: int) -> list[Path]:
     """Write the forces on all soles at the simulation's time steps; with several characters a file each.
 
     Raises
     ------
     InputError
-        If the shot cannot be read, or a file cannot be written.
+        If a file cannot be written.
     """
-    everybody = analysis.read(scene).loads
     written: list[Path] = []
     taken: set[str] = set()
-    for character in everybody:
+    for character in loads:
         target = path
-        if len(everybody) > 1:
+        if len(loads) > 1:
             stem = f"{path.stem}_{bpy.path.clean_name(character.motion.name)}"
             numbered = (f"{stem}_{number}" if number > 1 else stem for number in count(1))
             target = path.with_stem(next(name for name in numbered if name.casefold() not in taken))

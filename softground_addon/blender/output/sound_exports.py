@@ -33,9 +33,6 @@ def write(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    ground : bpy.types.Object
-    path : Path
     start, end : int
         First and last frame.
     samples : Path, optional

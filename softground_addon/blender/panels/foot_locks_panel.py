@@ -10,14 +10,8 @@ from ...core.errors import InputError
 from .. import settings
 from ..operator_base import reports_errors
 from ..operators.character_editing import active_character
-from ..operators.panel_base import Listed, SidebarPanel
+from ..operators.panel_base import Listed, SidebarPanel, chosen_of, draw_list, remove_chosen
 from ..translation import CONTEXT, translated
-
-
-def active_hold(character: Any) -> Any:
-    """The foot lock that is chosen in a character's list, or None."""
-    number = character.active_hold if character else -1
-    return character.holds[number] if 0 <= number < len(character.holds) else None
 
 
 class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
@@ -75,12 +69,10 @@ class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether one is chosen."""
         cls.poll_message_set(translated("Select a foot lock in the list first"))
-        return active_hold(active_character(settings.options_of(context))) is not None
+        return chosen_of(active_character(settings.options_of(context)), "holds", "active_hold") is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        character = active_character(settings.options_of(context))
-        character.holds.remove(character.active_hold)
-        character.active_hold = max(0, min(character.active_hold, len(character.holds) - 1))
+        remove_chosen(active_character(settings.options_of(context)), "holds", "active_hold")
         return {"FINISHED"}
 
 
@@ -103,14 +95,8 @@ class SOFTGROUND_PT_foot_locks(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         character = active_character(settings.options_of(context))
-        row = layout.row()
-        row.template_list(
-            "SOFTGROUND_UL_foot_locks", "", character, "holds", character, "active_hold", rows=2, maxrows=6
-        )
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_foot_lock", text="", icon="ADD")
-        buttons.operator("softground.remove_foot_lock", text="", icon="REMOVE")
-        hold = active_hold(character)
+        draw_list(layout, character, "holds", "active_hold", "foot_lock")
+        hold = chosen_of(character, "holds", "active_hold")
         if hold is None:
             return
         column = layout.column()

@@ -14,7 +14,7 @@ from ..debris import debris_object
 from ..ground import painted_ground
 from ..operators import prediction
 from ..operators.character_editing import active_character
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, draw_list
 from ..translation import CONTEXT, translated
 
 
@@ -38,7 +38,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         if predicted:
             row = column.row()
             row.active = False
-            text = estimate(predicted.analysis.coverage, prediction.fineness(scene, predicted))
+            text = estimate(predicted.analysis.coverage, prediction.fineness(prediction.asked(scene), predicted))
             row.label(text=text, icon="TIME", translate=False)
         if options.relief == "CLOSE_UP":
             column.prop(options, "relief_vertices")
@@ -157,15 +157,11 @@ class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
     bl_label = "Hard Ground"
 
     def draw(self, context: bpy.types.Context) -> None:
-        row, options = self.fields().row(), settings.options_of(context)
-        row.template_list(
-            "SOFTGROUND_UL_hard_grounds", "", options, "hard_grounds", options, "active_hard_ground", rows=2, maxrows=5
-        )
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_hard_ground", text="", icon="ADD")
-        buttons.operator("softground.remove_hard_ground", text="", icon="REMOVE")
+        options = settings.options_of(context)
+        layout = self.fields()
+        draw_list(layout, options, "hard_grounds", "active_hard_ground", "hard_ground", most=5)
         if 0 <= options.active_hard_ground < len(options.hard_grounds):
-            self.layout.prop(options.hard_grounds[options.active_hard_ground], "wet")
+            layout.prop(options.hard_grounds[options.active_hard_ground], "wet")
 
 
 class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):

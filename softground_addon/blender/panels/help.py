@@ -103,7 +103,7 @@ def bug_report(scene: bpy.types.Scene) -> str:
     ground = scene.softground.ground
     if ground is not None:
         lines += [f"Bake: {json.dumps(ground_mesh.summary_of(baked_ground.display_mesh_of(ground)))}"]
-        lines += warnings_of(scene)
+        lines += warnings_of(scene.softground.ground)
     return "\n".join(lines) + "\n"
 
 

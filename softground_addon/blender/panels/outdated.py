@@ -1,4 +1,4 @@
-"""Whether the bake on the ground still fits, as the panel shows it; worked out after `draw`, never in it."""
+"""Outdated bakes, as the panel shows them; worked out after `draw`, never in it."""
 
 from __future__ import annotations
 

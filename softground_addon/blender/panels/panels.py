@@ -18,7 +18,7 @@ from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, draw_list
 from ..settings import is_prop, is_set_up
 from ..translation import translated
 from . import outdated, preset_menu
@@ -63,21 +63,15 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             if nobody:
                 layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
             return
-        row = layout.row()
-        row.template_list(
-            "SOFTGROUND_UL_characters", "", options, "characters", options, "active_character", rows=1, maxrows=5
-        )
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_character", text="", icon="ADD")
-        buttons.operator("softground.remove_character", text="", icon="REMOVE")
+        draw_list(layout, options, "characters", "active_character", "character", rows=1, most=5)
         character = active_character(settings.options_of(context))
         if character:
             if not is_set_up(character):
                 layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
-            _scale(layout, settings.scene_of(context), character)
-            _on_the_spot(layout, settings.scene_of(context), character)
+            _scale(layout, settings.scene_of(context).unit_settings.scale_length, character)
+            _on_the_spot(layout, prediction.of(settings.scene_of(context)), character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
                 by_volume = mass == character.skin_mass
@@ -85,9 +79,9 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
 
 
-def _scale(layout: Any, scene: Any, character: Any) -> None:
+def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     """What size a character has whose file is in other units, and a button that puts it right."""
-    size = stature_of(scene, character.armature) if character.armature else 0.0
+    size = stature_of(unit_scale, character.armature) if character.armature else 0.0
     captured = is_captured(character)
     factor = scale_to_metres(size, captured=captured)
     if factor == 1.0:
@@ -103,9 +97,8 @@ def _scale(layout: Any, scene: Any, character: Any) -> None:
     box.operator("softground.fix_scale", text=translated("Scale by {factor}", factor=f"{factor:g}"), translate=False)
 
 
-def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
+def _on_the_spot(layout: Any, predicted: prediction.DepthPrediction | None, character: Any) -> None:
     """That a character walks in place, and a button that lets it travel."""
-    predicted = prediction.of(scene)
     title = title_of(character)
     if is_prop(character) or predicted is None or title not in predicted.analysis.belts:
         return
@@ -154,11 +147,7 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
         layout = self.fields()
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
-        row = layout.row()
-        row.template_list("SOFTGROUND_UL_soles", "", character, "soles", character, "active_sole", rows=3, maxrows=6)
-        buttons = row.column(align=True)
-        buttons.operator("softground.add_sole", text="", icon="ADD")
-        buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        draw_list(layout, character, "soles", "active_sole", "sole", rows=3)
         layout.operator("softground.add_contact", icon="PLUS")
         sole = active_sole(scene.softground)
         if not sole:

@@ -210,20 +210,16 @@ class SOFTGROUND_OT_predict_depth(ReadingShot):
     cancelled = "Predict Depth cancelled"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        return _predicting(scene)
-
-
-def _predicting(scene: bpy.types.Scene) -> jobs.Job[Reports]:
-    analysis.forget()
-    known = yield from analysis.reading(scene)
-    depth = yield from analysis.working_out_depth(scene)
-    deepest = known.contacts.depths.max(initial=0.0)
-    text = translated(
-        "Typical step: {typical} cm deep; the deepest: {deepest} cm",
-        typical=f"{(depth or 0.0) * 100:.1f}",
-        deepest=f"{deepest * 100:.1f}",
-    )
-    return [("INFO", text)]
+        analysis.forget()
+        known = yield from analysis.reading(scene)
+        depth = yield from analysis.working_out_depth(scene)
+        deepest = known.contacts.depths.max(initial=0.0)
+        text = translated(
+            "Typical step: {typical} cm deep; the deepest: {deepest} cm",
+            typical=f"{(depth or 0.0) * 100:.1f}",
+            deepest=f"{deepest * 100:.1f}",
+        )
+        return [("INFO", text)]
 
 
 class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):

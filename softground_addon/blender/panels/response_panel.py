@@ -47,13 +47,19 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         return bool(
-            character and character.armature and character.mass > 0 and stature_of(scene, character.armature) > 0
+            character
+            and character.armature
+            and character.mass > 0
+            and stature_of(scene.unit_settings.scale_length, character.armature) > 0
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
-        body = {"mass": character.mass, "arm": CENTRE_HEIGHT * stature_of(scene, character.armature)}
+        body = {
+            "mass": character.mass,
+            "arm": CENTRE_HEIGHT * stature_of(scene.unit_settings.scale_length, character.armature),
+        }
         gains = {
             "DEFAULT": TiltGains(),
             "AUTHORS": body_gains(*AUTHORS_TORQUES, **body),
@@ -208,7 +214,7 @@ def _group(layout: Any, group: Any, fields: tuple[str, ...]) -> Any:
 
 
 def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
-    """Which bone carries the body, and the frames where a gap is left."""
+    """The bone that carries the body, and the frames where a gap remains."""
     box = layout.box().column(align=True)
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")

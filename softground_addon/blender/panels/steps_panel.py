@@ -35,7 +35,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         layout.use_property_split = False
         scene = settings.scene_of(context)
-        steps, chosen = baked_steps.of(scene), baked_steps.chosen(scene)
+        steps, chosen = baked_steps.of(scene.softground.ground), baked_steps.chosen(scene.softground.ground)
         _list(layout, steps, chosen)
         if len(chosen) > 1:
             layout.label(text=translated("{count} steps selected", count=len(chosen)), translate=False)

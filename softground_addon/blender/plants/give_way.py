@@ -33,7 +33,6 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
 
     Parameters
     ----------
-    obj : bpy.types.Object
     kind : str
         One of `KINDS`.
     table : bpy.types.Object
@@ -75,7 +74,7 @@ def _follows(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> bo
             continue
         named = [*named_by_nodes(modifier), *(value for _, value in compat.node_inputs(modifier))]
         deforms = any(node.bl_idname == "GeometryNodeDeformCurvesOnSurface" for node in nodes_of(modifier))
-        if any(isinstance(one, bpy.types.Object) and one in grounds for one in named) or (on_surface and deforms):
+        if any(isinstance(block, bpy.types.Object) and block in grounds for block in named) or (on_surface and deforms):
             return True
     return False
 

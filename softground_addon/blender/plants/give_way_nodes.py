@@ -254,8 +254,8 @@ def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, latest: Any
     is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
-        graph.link(each, next(one for one in random.inputs if one.name == "ID"))
-    chance = next(one for one in random.outputs if one.enabled)
+        graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
+    chance = next(socket for socket in random.outputs if socket.enabled)
     geometry = graph.store(geometry, _CHANCE, chance, is_touched, domain=domain)
     geometry = graph.store(geometry, _MOVED, moved, is_touched, "FLOAT_VECTOR", domain)
     x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
@@ -323,7 +323,7 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
     def total(value: Any) -> Any:
         node = graph.accumulated(value, "FLOAT_VECTOR")
         graph.link(part, node.inputs["Group ID"])
-        return next(one for one in node.outputs if one.name == "Total" and one.enabled)
+        return next(socket for socket in node.outputs if socket.name == "Total" and socket.enabled)
 
     height = graph.number(graph.dot(position, table.up))
     among = graph.number(graph.math("ADD", 1.0, 0.0))
@@ -336,6 +336,6 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
     mesh = _stored(graph, mesh, "POINT", root, latest, moved, part)
     mesh = _put(graph, table, mesh, "POINT", position)
     joined = graph.node("GeometryNodeJoinGeometry")
-    for piece in [mesh, *(one for one in parts.outputs if one.name != "Mesh")]:
+    for piece in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
         graph.link(piece, joined.inputs["Geometry"])
     return joined.outputs["Geometry"]

@@ -6,12 +6,10 @@ from math import pi
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from .. import compat
 from ..shader_graph import Graph
-
-Array = NDArray[np.float64]
 
 NAME = "SoftGround Meadow"
 DENSITY, MOST = 6000.0, 60_000

@@ -61,7 +61,7 @@ def drop_all(mesh: bpy.types.Mesh) -> None:
     holder = bpy.data.objects.new("SoftGround Evaluation", mesh)
     holder.shape_key_clear()
     bpy.data.objects.remove(holder)
-    bpy.data.batch_remove([left for left in bpy.data.shape_keys if left.session_uid == keys])
+    bpy.data.batch_remove([unused for unused in bpy.data.shape_keys if unused.session_uid == keys])
 
 
 def _move_basis(mesh: bpy.types.Mesh, basis: Positions) -> None:

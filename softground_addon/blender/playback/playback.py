@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array, Indices
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
@@ -18,9 +19,6 @@ from ..node_modifiers import modifier_with
 from ..settings import find, found, name_of
 from . import own_data
 from . import playback_nodes as nodes
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 MODIFIER = nodes.GROUP
 
@@ -62,10 +60,8 @@ def attach(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     vertices : (P,) int array
         Vertex of its mesh that each of the spans is of.
-    spans : Spans
     table : bpy.types.Object
         The curves that these lie on, from `keyframe_tables`.
     up : (3,) float array

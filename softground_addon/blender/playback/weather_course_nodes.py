@@ -92,11 +92,8 @@ class CourseNodes:
 
     Parameters
     ----------
-    graph : NodeGraph
     said : mapping
         The group's inputs by name.
-    matter : Matter
-    span : Span
     soaking : (float, float)
         Least and largest share of its soaking that a hollow has left.
     table : bpy.types.Object
@@ -180,7 +177,7 @@ class CourseNodes:
         return self._keep(*(graph.number(vector) for vector in vectors))
 
     def between(self, left: Number) -> Number:
-        """How far a share of soaking is through those for which there are sums."""
+        """Place of a share of soaking among those for which there are sums."""
         low, high = self._soaking
         return ((left - low) * (1.0 / max(high - low, LEAST_RANGE))).within_one()
 
@@ -189,7 +186,7 @@ class CourseNodes:
         return self.graph.parts(self.graph.at_index(self.rows, self._vectors["hollows"], index))
 
     def _past(self, span: Span) -> tuple[Number, Number]:
-        """How many frames of each row are over, and number of the part in which it begins.
+        """Frames of each row that are over, and number of the part in which it begins.
 
         The first has not begun. Then they begin with the moments, and with the parts behind those; the last but one
         never ends, and the last is now.

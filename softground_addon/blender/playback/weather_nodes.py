@@ -162,9 +162,6 @@ class _Vertices:
 
     Parameters
     ----------
-    graph : NodeGraph
-    course : CourseNodes
-    matter : Matter
     up : (3,) floats
         See `build`.
     again, has_water : bool
@@ -224,14 +221,14 @@ class _Vertices:
             filled = self._number(self._course.aged["filled"], self._moment)
             change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
             pressed, risen = (graph.number(graph.attribute(name)) for name in (COMPRESSION, RIM))
-            left = filled + 1.0
-            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * left, risen * left, rounded), strict=True))
+            remaining = filled + 1.0
+            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * remaining, risen * remaining, rounded), strict=True))
             worn[BLOWN] = (pressed * filled * (-1.0 / COVERED)).within_one()
         height = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
-            left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
-            height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
+            remaining = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
+            height = height - self._thawed((remaining + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
         fresh = (cover * (1.0 / COVERED)).within_one()
         floods = acts["Rain"] + acts["Water Table"]
         standing = [self._standing(table, relief + height).where(floods)] if matter.soaking else []
@@ -282,10 +279,10 @@ class _Vertices:
     def _levels(self, table: Number) -> Number:
         """Height of the water in each of the hollows over its bottom [m], far below it in a dry one."""
         graph, course = self._graph, self._course
-        capacity, left, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
+        capacity, remaining, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
         rise = graph.attribute("rise", "FLOAT_VECTOR")
         low, high, seeped = course.hollows(filled.socket)
-        excess = low + (high - low) * course.between(left)
+        excess = low + (high - low) * course.between(remaining)
         share = (excess / capacity).within_one()
         root = share.root()
         powers = graph.combined(*(power.socket for power in (root, share, share * root)))
@@ -341,7 +338,7 @@ class _Vertices:
 
 
 def _shares(graph: NodeGraph, variance: Number) -> Any:
-    """How far a variance is through each of the spans between `BOUNDS`, 0 to 1."""
+    """Part of each span between `BOUNDS` that a variance is through, 0 to 1."""
     spans = [high - low for low, high in pairwise(BOUNDS)]
     factors = tuple(1.0 / span for span in spans)
     offsets = tuple(-low / span for low, span in zip(BOUNDS[:-1], spans, strict=True))

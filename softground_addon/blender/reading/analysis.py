@@ -6,15 +6,13 @@ as known until what it was read from changes; what the add-on itself writes leav
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.prediction import (
     ShotContacts,
@@ -28,6 +26,7 @@ from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import Coverage, coverage_of
 from ...core.loads.estimate import CharacterLoads
+from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
@@ -35,8 +34,6 @@ from ..ground import ground_surface
 from ..state import state
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
-
-Array = NDArray[np.float64]
 
 TRIALS = 3
 """Moduli that a match may press all contacts with: one is enough unless other contacts become typical."""
@@ -59,9 +56,6 @@ class Analysis:
         Of the animation, the meshes and the ground that it was read from, likewise.
     terms : tuple
         Settings that the loads and the contacts depend on beside that.
-    shot : Shot
-    loads : list of CharacterLoads
-    contacts : ShotContacts
     coverage : Coverage
         What the soles cover on the ground.
     """
@@ -105,19 +99,21 @@ def is_empty() -> bool:
 def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models that it was last asked for.
 
-    Only looks; see `current`.
+    Only looks; see `refreshing`.
     """
     analysis: Analysis | None = state.analyses.get(scene.session_uid)
-    return analysis if analysis and _source(scene, wanted or settings.snapshot(scene)) in analysis.sources else None
-
-
-def current(scene: bpy.types.Scene) -> Analysis | None:
-    """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
-    return jobs.run(refreshing(scene))
+    return (
+        analysis
+        if analysis and _source(scene.softground.ground, wanted or settings.snapshot(scene)) in analysis.sources
+        else None
+    )
 
 
 def refreshing(scene: bpy.types.Scene) -> jobs.Job[Analysis | None]:
-    """What `current` does, in steps. The scene is asked for nothing after the first."""
+    """The scene's analysis if it was read and still holds, with the masses and force models of the moment, in steps.
+
+    The scene is asked for nothing after the first.
+    """
     wanted, uid = settings.snapshot(scene), scene.session_uid
     analysis = known(scene, wanted)
     if analysis is None or analysis.terms == _terms(wanted):
@@ -146,9 +142,9 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     if analysis is None:
         wanted = settings_of(scene)
         shot = yield from read_shot(scene, replace(wanted, response=None))
-        source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
+        source, hashes = _source(scene.softground.ground, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
-        _tell_of_changes(scene)  # response layers were switched off and on again, which is no edit
+        _tell_of_changes(scene.view_layers)  # response layers were switched off and on again, which is no edit
         state.analyses[scene.session_uid] = analysis
     return analysis
 
@@ -157,13 +153,13 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
     if scene.session_uid in state.analyses:
-        _tell_of_changes(scene)  # of what others have changed until now, while it still counts
+        _tell_of_changes(scene.view_layers)  # of what others have changed until now, while it still counts
     analysis = known(scene)
     yield
     if analysis is None:
         return
-    _tell_of_changes(scene)
-    source = _source(scene, settings.snapshot(scene))
+    _tell_of_changes(scene.view_layers)
+    source = _source(scene.softground.ground, settings.snapshot(scene))
     if source in analysis.sources:
         state.analyses[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
@@ -171,9 +167,9 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
         state.analyses[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
-def _tell_of_changes(scene: bpy.types.Scene) -> None:
+def _tell_of_changes(view_layers: Iterable[bpy.types.ViewLayer]) -> None:
     """Have Blender call the handlers for what was changed by now."""
-    for layer in scene.view_layers:
+    for layer in view_layers:
         layer.update()
 
 
@@ -226,14 +222,14 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
 
 
 def _keep(
-    scene: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
+    uid: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
 ) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on, by the session uid of its scene."""
     loads = yield from estimate_shot(wanted, shot)
     pressing = pressed_contacts.slices(loads, ground_of(wanted, shot), wanted.cell_size_m)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), pressing)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, coverage_of(loads))
-    state.analyses[scene] = analysis
+    state.analyses[uid] = analysis
     state.depths.clear()
     state.depths[_key(wanted, analysis)] = contacts.typical
     return analysis
@@ -242,12 +238,12 @@ def _keep(
 def _hash_of(scene: bpy.types.Scene) -> str:
     """What a shot is read from, as far as it is not seen in the settings."""
     wanted = settings.snapshot(scene)
-    return report.hash_inputs(staleness.of_movers(scene, wanted), staleness.of_ground(wanted))
+    return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
 
 
-def _source(scene: bpy.types.Scene, wanted: BakeSettings) -> _Source:
+def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
     """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
-    return _parts(wanted)[0], wanted.ground and _place(scene.softground.ground)
+    return _parts(wanted)[0], ground and wanted.ground and _place(ground)
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:

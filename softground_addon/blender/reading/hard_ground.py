@@ -33,24 +33,20 @@ def with_hard_objects(
     motions: Sequence[CharacterMotion],
     ground: Terrain,
     bounds: Array,
-    own: Sequence[MeshTerrain] = (),
+    hard_parts: Sequence[MeshTerrain] = (),
 ) -> Slices[tuple[Terrain, list[Finding]]]:
     """A soft ground with the hard objects that soles stand on, and which of these are not in the settings.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    wanted : BakeSettings
-    motions : sequence of CharacterMotion
-    ground : Terrain
     bounds : (2, 2) float array
         Lower and upper corner of what is looked at [m].
-    own : sequence of MeshTerrain
+    hard_parts : sequence of MeshTerrain
         What of the ground itself is hard.
     """
     unit_scale, reach = wanted.unit_scale_m, reach_of(motions)
     tops = yield from _tops(wanted.hard_grounds, unit_scale, bounds)
-    hard, wet = [*own, *(top for _, top in tops)], dict[str, MeshTerrain]()
+    hard, wet = [*hard_parts, *(top for _, top in tops)], dict[str, MeshTerrain]()
     liquids = dict(zip(wanted.hard_grounds, wanted.wet_grounds, strict=False))
     for liquid in sorted({*wanted.wet_grounds} - {""}):
         pools = [top for name, top in tops if liquids[name] == liquid]
@@ -84,9 +80,9 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
     ground = settings.found(wanted.ground) if wanted.ground else None
-    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene, wanted))
+    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
     known |= {ground, display_mesh_of(ground)} if ground else set()
-    found = []
+    still = []
     for obj in scene.objects:
         if obj.type != "MESH" or obj in known or obj.hide_render or obj.display_type in ("WIRE", "BOUNDS"):
             continue
@@ -96,8 +92,8 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
         box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
         inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
         if inside.all(axis=1).any() and not ground_checks.hard_fault(obj):
-            found.append(settings.name_of(obj))
-    return found
+            still.append(settings.name_of(obj))
+    return still
 
 
 def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:

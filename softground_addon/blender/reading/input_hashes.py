@@ -55,7 +55,7 @@ def joined(texts: Iterable[str]) -> str:
 
 
 def of_topology(mesh: bpy.types.Mesh) -> str:
-    """Which vertices the faces of a mesh join."""
+    """Vertices that the faces of a mesh join."""
     corners = mesh_arrays.corner_vertices(mesh)
     return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.data):08x}"
 
@@ -67,7 +67,7 @@ def of_positions(mesh: bpy.types.Mesh) -> str:
 
 
 def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
-    """How strongly the vertices of a mesh belong to some of its vertex groups; of a large mesh, a sample of them."""
+    """Weights of the vertices of a mesh in some of its vertex groups; of a large mesh, a sample of them."""
     numbers = {group.index: group.name for group in obj.vertex_groups if group.name in groups}
     vertices = ground_mesh.mesh_of(obj).vertices
     looked_at = range(0, len(vertices), -(-len(vertices) // _LOOKED_AT)) if numbers and len(vertices) else ()
@@ -260,7 +260,7 @@ def _of_action(action: bpy.types.Action, slot: Any) -> str:
 
 
 def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
-    """How curves run between and beyond their keys."""
+    """Course of curves between and beyond their keys."""
     for curve in curves:
         parts = [curve.data_path, str(curve.array_index), curve.extrapolation]
         for part in _KEY_SHAPE:
@@ -273,7 +273,7 @@ def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
 
 
 def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
-    """How a strip plays its action; by its own curves where these decide."""
+    """Settings by which a strip plays its action; its own curves where these decide."""
     animated = {f"{_path(strip)}.{curve.data_path}" for curve in strip.fcurves}
     yield from of_settings(strip, animated)
     yield from _of_curves(strip.fcurves)
@@ -307,7 +307,7 @@ def _value_of(target: Any, known: Known) -> str:
 
 
 def _of_bones(obj: bpy.types.Object) -> Iterator[str]:
-    """How the bones of an armature lie at rest, and how those are posed that nothing animates."""
+    """Rest pose of the bones of an armature, and poses of those that nothing animates."""
     armature: Any = obj.data
     yield armature.pose_position
     for bone in armature.bones:

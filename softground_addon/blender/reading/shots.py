@@ -34,6 +34,7 @@ from ..characters.import_fixes import size_of
 from ..ground import ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
+from ..kept import kept
 from ..response.character_keys import ReadRig, controls_of
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
@@ -105,7 +106,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     InputError
         If not; names what is wrong and the remedy.
     """
-    settings.forget_deleted_ground(scene)
+    settings.forget_deleted_ground(scene.softground)
     setting_paths.check_stored(scene.softground)
     for character in scene.softground.characters:
         rig = character.armature or character.body
@@ -127,7 +128,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     for printing in wanted.characters:
         if printing.armature:
             require_armature(settings.found(printing.armature))
-        check_props(scene, printing.name, printing.soles, ground)
+        check_props(scene.objects, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
@@ -169,9 +170,10 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
-    soft = yield from meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    own = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
-    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, own)
+    binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
+    soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
+    hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
+    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
 
 
@@ -181,9 +183,9 @@ def _with_hard(
     motions: list[CharacterMotion],
     ground: Terrain,
     bounds: Array,
-    own: Sequence[MeshTerrain] = (),
+    hard_parts: Sequence[MeshTerrain] = (),
 ) -> Job[tuple[Terrain, list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, own)
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, hard_parts)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
@@ -227,7 +229,7 @@ def sample_characters(
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s, set_by=TIME_LIMIT)
-    motions, rigs = [], []
+    motions, rigs, units = [], [], wanted.units  # what was read is compared later, and is not all settings
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, character in enumerate(wanted.characters):
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
@@ -235,10 +237,10 @@ def sample_characters(
         if character.armature:
             armature = settings.found(character.armature)
             if wanted.response:
-                check_rig(scene, armature, mapping, character.mass_kg)
-                controls = controls_of(scene, armature, mapping)
+                check_rig(scene.objects, armature, mapping, character.mass_kg)
+                controls = controls_of(scene.view_layers[0], armature, mapping)
                 poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
-            grown = size_of(scene, armature) / character.size_m if character.size_m else 1.0
+            grown = size_of(scene.unit_settings.scale_length, armature) / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,
                 armature,
@@ -248,17 +250,17 @@ def sample_characters(
                 frames=frames,
                 poses=poses,
                 below=below,
-                units=wanted,
+                units=units,
                 findings=findings,
             )
         elif character.body:
             mass, skin_mass = character.mass_kg, character.skin_mass_kg
             job = sample_body(
-                scene, character.body, mapping, mass=mass, frames=frames, units=wanted, skin_mass=skin_mass
+                scene, character.body, mapping, mass=mass, frames=frames, units=units, skin_mass=skin_mass
             )
         else:
             job = sample_prop(
-                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=wanted, findings=findings
+                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=units, findings=findings
             )
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
         if poses:

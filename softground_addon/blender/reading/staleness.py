@@ -60,7 +60,6 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
     ----------
     inputs : mapping
         Settings that it was made with, as `BakeSettings.inputs` has them.
-    ground : bpy.types.Object
     hashes : mapping of str to str
         From `of_movers` and `of_soles`, as they were when they were read.
     """
@@ -85,23 +84,24 @@ def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], so
         ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(renewed)
 
 
-def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
+def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: BakeSettings) -> tuple[str, ...]:
     """What has changed since the bake on a ground, for the user to read; nothing where there is none.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
+    objects : iterable of bpy.types.Object
+        Those of the scene.
     wanted : BakeSettings
         What a bake would be made with now.
     """
-    deletion = _deletion_of(scene.softground.ground)
+    deletion = _deletion_of(ground)
     if deletion or wanted.ground is None:
         return deletion
     ground = settings.found(wanted.ground)
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
-    if edited := next((obj for obj in (ground, display_mesh, *bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
+    if edited := next((obj for obj in (ground, display_mesh, *bodies_of(objects, wanted)) if obj.mode == "EDIT"), None):
         return (translated("'{name}' is in Edit Mode", name=edited.name),)
     if playback.modifier_of(display_mesh) is None:
         text = "'{name}' has lost its playback modifier, and its prints no longer move"
@@ -109,9 +109,9 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         of_settings = _of_settings(wanted.inputs(Acts.WRITING))
-        now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
+        now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(objects, wanted)}
         soles = {key: value for key, value in then.items() if key.startswith(f"{SOLE}:")}
-        now |= soles | of_soles(scene, [key.removeprefix(f"{SOLE}:") for key in soles])  # those that are gone last
+        now |= soles | of_soles(objects, [key.removeprefix(f"{SOLE}:") for key in soles])  # those that are gone last
         left_out = () if then.pop(VERSION, "") == SERIES else _OF_VERSION
         changed = [(kind, name) for kind, name in _changes(then, now) if kind not in left_out]
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
@@ -151,7 +151,7 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
     return (translated(text, name=ground.name),)
 
 
-def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
+def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and the
     hard objects that bear them."""
     ground = settings.found(wanted.ground) if wanted.ground else None
@@ -160,7 +160,7 @@ def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
-        **{f"{BODY}:{character.name}": _of_body(scene, character) for character in wanted.characters},
+        **{f"{BODY}:{character.name}": _of_body(objects, character) for character in wanted.characters},
         **{f"{HARD}:{name.name}": _of_hard(settings.found(name)) for name in wanted.hard_grounds},
     }
 
@@ -170,11 +170,11 @@ def _of_hard(obj: bpy.types.Object) -> str:
     return input_hashes.joined([_of_ground(obj), *modifiers])
 
 
-def of_soles(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, str]:
+def of_soles(objects: settings.Objects, names: Iterable[str]) -> dict[str, str]:
     """Hashes of the meshes whose soles press edited steps, of those that are there; where they stand does not count."""
     wanted = set(names)
-    objects = [obj for obj in scene.objects if obj.name_full in wanted and obj.type == "MESH"] if wanted else []
-    return {f"{SOLE}:{obj.name_full}": _of_sole(obj) for obj in objects}
+    named = [obj for obj in objects if obj.name_full in wanted and obj.type == "MESH"] if wanted else []
+    return {f"{SOLE}:{obj.name_full}": _of_sole(obj) for obj in named}
 
 
 def _of_sole(obj: bpy.types.Object) -> str:
@@ -289,20 +289,20 @@ def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
     return [object_named(sole.object) for sole in character.soles if sole.object]
 
 
-def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_on(scene, settings.found(character.armature)) if character.armature else _worn_by_body(character)
+def _worn_by(objects: settings.Objects, character: CharacterSettings) -> list[bpy.types.Object]:
+    return meshes_on(objects, settings.found(character.armature)) if character.armature else _worn_by_body(character)
 
 
 def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
     return meshes_of(settings.found(character.body)) if character.body else []
 
 
-def bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
+def bodies_of(objects: settings.Objects, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
-    return [obj for character in wanted.characters for obj in (*_worn_by(scene, character), *_things_of(character))]
+    return [obj for character in wanted.characters for obj in (*_worn_by(objects, character), *_things_of(character))]
 
 
-def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
+def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     parts = []
@@ -312,10 +312,10 @@ def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
     parts += [
         f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
         f"{input_hashes.of_shapes(worn)}"
-        for worn in _worn_by(scene, character)
+        for worn in _worn_by(objects, character)
     ]
     if character.armature:
-        rigs = worn_rigs(scene, settings.found(character.armature))
+        rigs = worn_rigs(objects, settings.found(character.armature))
         parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 

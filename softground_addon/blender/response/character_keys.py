@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.legs.grounding import Response
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import quaternions
 from ...core.numerics.rigid import carried
@@ -21,8 +21,6 @@ from ..sampling.control_poses import RigPoses
 from ..sampling.rig_checks import check_bones
 from ..settings import found
 from .rig_controls import BODY, Control, find_controls
-
-Array = NDArray[np.float64]
 
 ANGLE_TOLERANCE = np.radians(0.04)
 """Largest error of angles between keys [rad]: a leg has four joints whose errors add."""
@@ -52,11 +50,8 @@ def response_curves(
 
     Parameters
     ----------
-    armature : ObjectName
-    rig : ReadRig
     motion : CharacterMotion
         The source that the response belongs to.
-    response : Response
     metre : float
         Blender unit [m].
     stretch : float
@@ -78,7 +73,7 @@ def response_curves(
     return curves
 
 
-def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
+def controls_of(view_layer: bpy.types.ViewLayer, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
     """The bones of a rig that a response is keyed on.
 
     Raises
@@ -87,7 +82,7 @@ def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Rig
         If it has no bone that carries the body, or bones of the mapping are gone.
     """
     check_bones(armature, mapping)
-    depsgraph = scene.view_layers[0].depsgraph
+    depsgraph = view_layer.depsgraph
     assert depsgraph is not None
     return find_controls(armature, armature.evaluated_get(depsgraph), mapping)
 

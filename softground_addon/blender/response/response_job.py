@@ -51,18 +51,18 @@ def check_characters(characters: Iterable[CharacterSettings]) -> None:
         check_layerable(armature)
 
 
-def _refusal(scene: bpy.types.Scene, characters: Sequence[CharacterSettings]) -> str:
+def _refusal(view_layer: bpy.types.ViewLayer, characters: Sequence[CharacterSettings]) -> str:
     """Reason why a layer cannot let feet down, with the remedy; empty if it can."""
     try:
         check_characters(characters)
         for character, armature in rigged(characters):
-            controls_of(scene, armature, RigMapping(character.joints, character.soles, "settings"))
+            controls_of(view_layer, armature, RigMapping(character.joints, character.soles, "settings"))
     except InputError as error:
         return str(error)
     return ""
 
 
-def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeSettings, list[Finding]]:
+def without_sinking(view_layer: bpy.types.ViewLayer, wanted: BakeSettings) -> tuple[BakeSettings, list[Finding]]:
     """The settings without the layer that lowers feet, where a rig cannot take it, and the finding about it.
 
     Raises InputError if another response is wanted.
@@ -72,7 +72,7 @@ def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeS
     if not wanted.sink_feet or wanted.output != "BOTH" or wanted.response.tilt:
         check_characters(wanted.characters)
         return wanted, []
-    why = _refusal(scene, wanted.characters)
+    why = _refusal(view_layer, wanted.characters)
     if not why:
         return wanted, []
     said = Finding(
@@ -160,23 +160,23 @@ def _notes(root_control: str, character: CharacterResponse) -> dict[str, str]:
 
 
 def put_layers(
-    scene: bpy.types.Scene, wanted: BakeSettings, layers: Sequence[Layer], kind: LayerKind = LayerKind.RESPONSE
+    options: Any, wanted: BakeSettings, layers: Sequence[Layer], kind: LayerKind = LayerKind.RESPONSE
 ) -> None:
     """Put each character's layer in the place of an earlier one; take that off where there is none now."""
     for number, (_, armature) in enumerate(rigged(wanted.characters)):
         if number < len(layers) and layers[number].curves:
-            show_layer(scene, armature, kind, layers[number])
+            show_layer(options, armature, kind, layers[number])
         else:
             remove_layer(armature, kind)
 
 
-def show_layer(scene: bpy.types.Scene, armature: bpy.types.Object, kind: LayerKind, layer: Layer) -> None:
+def show_layer(options: Any, armature: bpy.types.Object, kind: LayerKind, layer: Layer) -> None:
     """Put a layer on an armature, as strong as its character has it."""
     put_layer(armature, kind, layer.curves, layer.notes)
-    for character in scene.softground.characters:
+    for character in options.characters:
         if character.armature == armature:
             set_strength(armature, kind, settings.typed(getattr(character, kind.strength)))
-    scene.softground.has_layers |= kind in BAKED
+    options.has_layers |= kind in BAKED
 
 
 BAKED = (LayerKind.CLEAN_FEET, LayerKind.RESPONSE)

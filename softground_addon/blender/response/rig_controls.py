@@ -32,7 +32,6 @@ class Control:
 
     Attributes
     ----------
-    bone : str
     part : str
         Part that it moves with: "body", or "thigh", "shank", "foot", "knee", "arm" and a side, e.g.
         "thigh_l".
@@ -53,10 +52,8 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
 
     Parameters
     ----------
-    armature : bpy.types.Object
     evaluated : bpy.types.Object
         The same as a dependency graph evaluates it: there the influence of switches is known.
-    mapping : RigMapping
 
     Raises
     ------

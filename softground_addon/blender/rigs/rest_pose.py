@@ -14,7 +14,7 @@ from itertools import combinations
 import bpy
 import numpy as np
 
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array
 
 Joints = dict[str, tuple[str, str]]
 Feet = list[tuple[str, str, str, str]]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..animation_layer.constraint_layer import is_own
+from ..settings import Objects
 
 Array = NDArray[np.float64]
 Lead = tuple[bpy.types.Object, str]
@@ -23,9 +24,9 @@ _FULL = 0.5
 """Least influence of a constraint that counts."""
 
 
-def worn_rigs(scene: bpy.types.Scene, body: bpy.types.Object) -> list[bpy.types.Object]:
+def worn_rigs(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object]:
     """The armatures that a body wears: they hang on its bones, or have no keys and go where its bones go."""
-    return [obj for obj in scene.objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
+    return [obj for obj in objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
 
 
 def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> str:

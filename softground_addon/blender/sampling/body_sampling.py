@@ -62,7 +62,6 @@ def read_body(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     name : ObjectName
         An empty above mesh objects, or a mesh object.
     known : collection of str

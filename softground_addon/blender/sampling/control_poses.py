@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.carving.responded_skin import WornSkin
+from ...core.numerics.arrays import Array
 from ...core.rig.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 class RigPoses:
@@ -18,7 +16,6 @@ class RigPoses:
 
     Attributes
     ----------
-    bones : tuple of str
     matrices : dict of str to (F, 4, 4) float array
         Pose of each bone in the armature's frame [Blender units].
     world : (F, 4, 4) float array

@@ -14,13 +14,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ...core.numerics.orientation import euler_rotations, rotation_matrices
 from ...core.numerics.rigid import rotation, unit
 from ..animation_layer.constraint_layer import is_own
 from ..animation_layer.layer_curves import path_of_bone
 from ..compat import HAS_SLOTS, action_curves, slot_of
-
-Array = NDArray[np.float64]
 
 _NO_SIMPLE_CHANNEL = re.compile(r'(.*\.)?rotation_mode|delta_.*|pose\.bones\[[^"].*')
 """Animated paths that mean more than the value of a channel, or name a bone in a way of their own."""

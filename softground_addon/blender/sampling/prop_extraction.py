@@ -7,32 +7,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
 from ...core.motion.sole_motion import SoleMotion
+from ...core.numerics.arrays import Array
 from ...core.rig.mapping import SoleSource
 from ...core.soles.prop_motion import prop_motion
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries
+from ..settings import Objects
 
 
 def check_props(
-    scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, ...], ground: bpy.types.Object | None = None
+    objects: Objects, owner: str, sources: tuple[SoleSource, ...], ground: bpy.types.Object | None = None
 ) -> None:
     """Raise InputError, naming the remedy, if an object that should print cannot.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     owner : str
         Whose soles they are.
-    sources : tuple of SoleSource
     ground : bpy.types.Object, optional
         What they may not be: that which they print on.
     """
     for source in sources:
         if not source.object:
             continue
-        obj = next((obj for obj in scene.objects if obj.name_full == source.object), None)
+        obj = next((obj for obj in objects if obj.name_full == source.object), None)
         if obj is None:
             raise InputError(
                 f"Sole '{source.name}' of '{owner}': object '{source.object}' was deleted: choose another one, or "
@@ -50,18 +49,18 @@ def check_props(
             )
 
 
-def surface_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
+def surface_of(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
     """Vertices (V, 3) and triangles (T, 3) of a mesh object in its own frame, with its modifiers.
 
-    Without them where the object is hidden in the scene: Blender does not evaluate it then.
+    Without them where the object is hidden in the layer: Blender does not evaluate it then.
 
     Raises
     ------
     InputError
         If it has no faces.
     """
-    scene.view_layers[0].update()
-    depsgraph = scene.view_layers[0].depsgraph
+    view_layer.update()
+    depsgraph = view_layer.depsgraph
     evaluated = obj.evaluated_get(depsgraph) if depsgraph else obj
     mesh = evaluated.to_mesh()
     try:
@@ -82,7 +81,6 @@ def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tu
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     source : SoleSource
         Names the object.
     matrices : (F, 4, 4) float array
@@ -94,5 +92,5 @@ def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tu
         If its mesh has no faces, or its scale is 0 or changes.
     """
     obj = next(obj for obj in scene.objects if obj.name_full == source.object)
-    vertices, triangles = surface_of(scene, obj)
+    vertices, triangles = surface_of(scene.view_layers[0], obj)
     return prop_motion(vertices, triangles, matrices, owner=obj.name, name=source.name, side=source.side)

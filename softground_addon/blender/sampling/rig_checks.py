@@ -12,6 +12,7 @@ from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.recording import Recording
 from ..animation_layer.constraint_layer import is_own
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, require_armature
+from ..settings import Objects
 from .prop_extraction import check_props
 
 _SCALE_TOLERANCE = 1e-3
@@ -36,7 +37,7 @@ def check_mass(name: str, mass: float) -> None:
         raise InputError(f"The mass of '{name}' is {mass} kg: give it a positive mass.")
 
 
-def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
+def check_rig(objects: Objects, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
     """Raise InputError, with the armature and the remedy, where a character cannot be read."""
     require_armature(armature)
     name = armature.name
@@ -49,7 +50,7 @@ def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMa
     for source in mapping.soles:
         if not source.bone and not source.object:
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
-    check_props(scene, name, mapping.soles)
+    check_props(objects, name, mapping.soles)
     check_bones(armature, mapping)
     if armature.mode == "EDIT":
         raise InputError(f"Armature '{name}' is in Edit Mode and stands still: leave it with Tab first.")

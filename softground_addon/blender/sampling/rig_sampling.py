@@ -7,7 +7,7 @@ user's frame, pose and handlers are left alone. Frame handlers of others act in 
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 
 import bpy
 import numpy as np
@@ -15,6 +15,8 @@ import numpy as np
 from ...core.carving.responded_skin import WornSkin
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
+from ...core.motion.sole_motion import SoleMotion
+from ...core.rig.bones import RigBones
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
 from ...core.rig.recording import Recording, SceneUnits
@@ -22,6 +24,7 @@ from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import LONGEST, skin_stances
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
+from ..kept import kept
 from ..rigs.rig_mapping import rest_bones
 from ..settings import found, name_of, units_of
 from .control_poses import RigPoses
@@ -86,14 +89,14 @@ def sample_character(
     InputError
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
-    check_rig(scene, armature, mapping, mass)
+    check_rig(scene.objects, armature, mapping, mass)
     check_frames(frames)
     bones = [*bones_of(mapping), *(poses.bones if poses else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
-    if on_bones and meshes_on(scene, armature):
-        skin = yield from meanwhile(0, read_skin.slices(scene, armature))
+    if on_bones and meshes_on(scene.objects, armature):
+        skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
         armature = found(rig)
     units = units or units_of(scene)
     bones += skin.bones if skin and len(frames) <= LONGEST else ()
@@ -122,7 +125,6 @@ def recorded_motion(
     ----------
     recording : Recording
         Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `LONGEST` samples.
-    skin : RigSkin or None
     scene, armature, mapping, mass, skin_mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """
@@ -133,6 +135,20 @@ def recorded_motion(
         for source in mapping.soles
         if source.object
     }
+    read = name, bones, mapping, recording, skin, mass, skin_mass, carried
+    return (yield from kept(len(recording.frames), f"motion of {name}", read, _motion(*read)))
+
+
+def _motion(
+    name: str,
+    bones: RigBones,
+    mapping: RigMapping,
+    recording: Recording,
+    skin: RigSkin | None,
+    mass: float,
+    skin_mass: float,
+    carried: Mapping[str, SoleMotion],
+) -> Sampling:
     count, stances = len(recording.frames), None
     if skin and count <= LONGEST:
         step = float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
@@ -165,7 +181,7 @@ def sample_prop(
     """
     check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
-    check_props(scene, name, sources)
+    check_props(scene.objects, name, sources)
     check_frames(frames)
     props = list(dict.fromkeys(source.object for source in sources))
     recording = yield from record_props(scene, name, frames, units, props, findings=findings)

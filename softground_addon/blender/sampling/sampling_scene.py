@@ -69,10 +69,10 @@ def user_scene(scene: bpy.types.Scene) -> Iterator[str]:
     try:
         yield name
     finally:
-        left = bpy.data.scenes.get(name)
-        if left is not None:
+        remaining = bpy.data.scenes.get(name)
+        if remaining is not None:
             with handlers_silent():
-                left.frame_set(shown[0], subframe=shown[1])
+                remaining.frame_set(shown[0], subframe=shown[1])
 
 
 def still_there(name: str) -> bpy.types.Scene:

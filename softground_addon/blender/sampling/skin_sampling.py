@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.motion import Array
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
-from ...core.rig.rig_skin import Indices, RigSkin, Shape
+from ...core.rig.rig_skin import RigSkin, Shape
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
-from ..settings import ObjectName, found, name_of
+from ..settings import ObjectName, Objects, found, name_of
 from .seen_mesh import as_seen, left_out
 
 _SLICE = 2_000
@@ -26,25 +26,25 @@ _LEAST_WEIGHT = 1e-4
 """Weights that come to less leave a vertex where its object is, as in Blender's armature deformation."""
 
 
-def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+def meshes_on(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
 
     With those of rigs that it wears, if it has any by itself. Beside rendered ones, those that are not are mostly
     stand-ins.
     """
-    worn = _worn_by(scene, armature)
+    worn = _worn_by(objects, armature)
     return [obj for obj in worn if not obj.hide_render] or worn
 
 
-def hidden_on(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
+def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
     """The meshes on some bones of an armature that `meshes_on` leaves out, as they are not rendered."""
-    read = meshes_on(scene, armature)
-    return [obj for obj in _worn_by(scene, armature) if obj not in read and _is_on(obj, bones)]
+    read = meshes_on(objects, armature)
+    return [obj for obj in _worn_by(objects, armature) if obj not in read and _is_on(obj, bones)]
 
 
-def left_out_on(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
+def left_out_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
     """What shapes the meshes on some bones and is not read, by the name of the mesh."""
-    on_bones = (obj for obj in meshes_on(scene, armature) if _is_on(obj, bones))
+    on_bones = (obj for obj in meshes_on(objects, armature) if _is_on(obj, bones))
     return {obj.name: names for obj in on_bones if (names := left_out(obj))}
 
 
@@ -52,10 +52,10 @@ def _is_on(obj: bpy.types.Object, bones: Collection[str]) -> bool:
     return obj.parent_bone in bones or bool({group.name for group in obj.vertex_groups} & set(bones))
 
 
-def _worn_by(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    worn = [obj for obj in scene.objects if obj.type == "MESH" and _wears(armature, obj)]
-    rigs = worn_rigs(scene, armature) if worn else []
-    more = (obj for obj in scene.objects if obj.type == "MESH" and any(_wears(rig, obj) for rig in rigs))
+def _worn_by(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    worn = [obj for obj in objects if obj.type == "MESH" and _wears(armature, obj)]
+    rigs = worn_rigs(objects, armature) if worn else []
+    more = (obj for obj in objects if obj.type == "MESH" and any(_wears(rig, obj) for rig in rigs))
     return list(dict.fromkeys([*worn, *more]))
 
 
@@ -74,7 +74,7 @@ def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
 
 
 @sliced
-def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigSkin | None]:
+def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | None]:
     """The meshes on an armature that `meshes_on` names, or None where there is none.
 
     Raises
@@ -83,8 +83,8 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
         If one is being edited.
     """
     pieces, body = [], name_of(armature)
-    rigs = [armature, *worn_rigs(scene, armature)]
-    worn = [(obj, next(rig for rig in rigs if _wears(rig, obj))) for obj in meshes_on(scene, armature)]
+    rigs = [armature, *worn_rigs(objects, armature)]
+    worn = [(obj, next(rig for rig in rigs if _wears(rig, obj))) for obj in meshes_on(objects, armature)]
     for name, rig in [(name_of(obj), name_of(rig)) for obj, rig in worn]:
         obj, armature = found(name), found(rig)
         if obj.mode == "EDIT":

@@ -33,6 +33,7 @@ FORCES: dict[str, Colour] = {
 }
 CONTACT: Colour = (0.95, 0.25, 0.2, 0.45)
 RIM: Colour = (0.25, 0.75, 0.95, 0.35)
+PRESSED: Colour = (0.1, 0.08, 0.06, 0.6)
 LINE, BOLD_LINE = 1.5, 3.0
 """Widths of lines [px, before the interface's scale]."""
 HEAD = 0.15
@@ -86,6 +87,24 @@ def draw_shapes() -> None:
         gpu.state.blend_set("NONE")
 
 
+def draw_pressed() -> None:
+    """Draw the prints that a bake has pressed so far, until the ground shows them; for the viewport's draw handler."""
+    context: Any = bpy.context
+    if state.pressing is None:
+        return
+    import gpu  # noqa: PLC0415
+
+    shapes, metre = state.pressing.shapes, 1.0 / context.scene.unit_settings.scale_length
+    for pressed in state.pressing.footprints[len(shapes) :]:
+        cells = overlay_shapes.touched(pressed)
+        shapes.append(_triangles(overlay_shapes.squares(cells, pressed.cell_size, state.pressing.terrain) * metre))
+    if context.space_data.overlay.show_overlays:
+        gpu.state.blend_set("ALPHA")
+        for triangles in shapes:
+            _draw(triangles, PRESSED)
+        gpu.state.blend_set("NONE")
+
+
 def draw_numbers() -> None:
     """Number the footfalls; for the viewport's draw handler in pixels."""
     panel = session.current()
@@ -117,7 +136,7 @@ def draw_numbers() -> None:
 
 def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
     """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
-    shown = live.in_contact(scene)
+    shown = live.in_contact(scene.session_uid)
     if shown is not None:
         windows, size, reach = shown
         touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
@@ -143,15 +162,25 @@ def draw_line(points: Array, colour: Colour, width: float) -> None:
 
 
 def _fill(triangles: Array, colour: Colour) -> None:
+    if len(triangles):
+        _draw(_triangles(triangles), colour)
+
+
+def _triangles(corners: Array) -> Any:
+    """Triangles (3·N, 3) in the units of the scene, as the graphics card holds them."""
     import gpu  # noqa: PLC0415
     from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
 
-    if not len(triangles):
-        return
+    content: Any = {"pos": corners.astype(np.float32)}
+    return batch_for_shader(gpu.shader.from_builtin("UNIFORM_COLOR"), "TRIS", content)
+
+
+def _draw(triangles: Any, colour: Colour) -> None:
+    import gpu  # noqa: PLC0415
+
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", colour)
-    content: Any = {"pos": triangles.astype(np.float32)}
-    batch_for_shader(shader, "TRIS", content).draw(shader)
+    triangles.draw(shader)
 
 
 def _arrow(start: Array, end: Array, colour: Colour) -> None:
@@ -185,19 +214,15 @@ class SOFTGROUND_OT_overlay(ReadingShot):
     cancelled = "The overlay stays hidden"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
-        return _showing(scene)
+        shown = session.current().show_overlay
+        if not shown:
+            yield from analysis.reading(scene)
+        return not shown
 
     def _show(self, result: bool) -> None:
         session.current().show_overlay = result
         session.redraw()
         session.redraw(region_type="WINDOW")
-
-
-def _showing(scene: bpy.types.Scene) -> jobs.Job[bool]:
-    shown = session.current().show_overlay
-    if not shown:
-        yield from analysis.reading(scene)
-    return not shown
 
 
 class SOFTGROUND_OT_read_again(Reading):
@@ -209,16 +234,12 @@ class SOFTGROUND_OT_read_again(Reading):
     cancelled = "The overlay shows nothing until the next edit"
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
-        return _read_if_possible(scene)
+        with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+            yield from analysis.reading(scene)
+        return analysis.known(scene) is not None
 
     def _show(self, _result: bool) -> None:
         session.redraw(region_type="WINDOW")
-
-
-def _read_if_possible(scene: bpy.types.Scene) -> jobs.Job[bool]:
-    with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-        yield from analysis.reading(scene)
-    return analysis.known(scene) is not None
 
 
 def read_again() -> float | None:
@@ -233,7 +254,7 @@ def read_again() -> float | None:
     return None
 
 
-DRAWN = ((draw_shapes, "POST_VIEW"), (draw_numbers, "POST_PIXEL"))
+DRAWN = ((draw_shapes, "POST_VIEW"), (draw_pressed, "POST_VIEW"), (draw_numbers, "POST_PIXEL"))
 """What is drawn over viewports, and when."""
 
 

@@ -14,13 +14,13 @@ from ...core.ground.sparse_grid import Window
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.props import posed
 from ...core.motion.sole_motion import Sole
+from ...core.numerics.arrays import Array
 from ...core.numerics.cell_keys import cells_of, keys_of
 from ...core.numerics.intervals import runs
 from ...core.pressing.rim import dilate
 from ...core.record.footprints import Footprint
 from ...core.soles.outlines import convex_hull
 
-Array = NDArray[np.float64]
 Cells = NDArray[np.integer[Any]]
 """Column and row of each cell, (N, 2)."""
 
@@ -123,8 +123,12 @@ def touched_at(footprints: Sequence[Footprint], frame: float) -> Iterator[Cells]
     """The cells that each sole touches at a frame."""
     for footprint in footprints:
         if footprint.start_frame - footprint.frame_step <= frame <= footprint.end_frame + footprint.frame_step:
-            touched = (footprint.contact_start <= frame) & (frame <= footprint.contact_end)
-            yield _placed(footprint.window, *np.divmod(footprint.contact_cells[touched], footprint.window.columns))
+            yield touched(footprint, (footprint.contact_start <= frame) & (frame <= footprint.contact_end))
+
+
+def touched(footprint: Footprint, when: NDArray[np.bool_] | slice = slice(None)) -> Cells:
+    """The cells that a sole touches, or some of them."""
+    return _placed(footprint.window, *np.divmod(footprint.contact_cells[when], footprint.window.columns))
 
 
 def marked(window: Window, mask: NDArray[np.bool_]) -> Cells:

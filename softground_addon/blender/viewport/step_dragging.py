@@ -118,7 +118,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         scene = settings.scene_of(context)
         if state.box:
             return self._box(scene, event, region, view)
-        step = _under(baked_steps.of(scene), region, view, event) if region is not None else None
+        step = _under(baked_steps.of(scene.softground.ground), region, view, event) if region is not None else None
         if event.type == "MOUSEMOVE":
             name = step.name if step else ""
             if name != state.under:
@@ -133,10 +133,10 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             else:
                 if step.name not in session.chosen_steps():
                     session.choose_steps(step.name)
-                preview = StepPreview(scene.softground.ground, step_edits.editable(scene))
+                preview = StepPreview(scene.softground.ground, jobs.run(step_edits.reading(scene)))
                 mouse = _on_plane(region, view, event, step.height)
                 mouse = step.baked.position[:2] if mouse is None else mouse
-                self._drag = _Drag(step, baked_steps.chosen(scene), preview, mouse, step.edit)
+                self._drag = _Drag(step, baked_steps.chosen(scene.softground.ground), preview, mouse, step.edit)
             session.redraw()
             _redraw()
             return {"RUNNING_MODAL"}
@@ -147,7 +147,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
         state.box = [state.box[0], (min(max(x, 0), region.width), min(max(y, 0), region.height))]
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            inside = _within(state.box, baked_steps.of(scene), region, view)
+            inside = _within(state.box, baked_steps.of(scene.softground.ground), region, view)
             names = [*(session.chosen_steps() if event.shift else ()), *inside]
             session.choose_steps(names[0] if names else "", names)
             state.box = ()
@@ -169,7 +169,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             drag.edit, state.edits = edit, (edits := drag.edits(edit))
             if not drag.is_slow:
                 start = time.thread_time()  # whatever else the machine does
-                drag.preview.show(changed(scene, [(step, edits[step.name]) for step in drag.steps]))
+                drag.preview.show(changed(scene.softground.ground, [(step, edits[step.name]) for step in drag.steps]))
                 drag.is_slow = len(drag.steps) > 1 and time.thread_time() - start > SLOW
             _redraw()
 
@@ -202,7 +202,10 @@ class SOFTGROUND_OT_drop_steps(OnSteps, EditJob):
 
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
         edits = state.edits
-        return changed(scene, [(step, edits[step.name]) for step in baked_steps.of(scene) if step.name in edits]), []
+        return changed(
+            scene.softground.ground,
+            [(step, edits[step.name]) for step in baked_steps.of(scene.softground.ground) if step.name in edits],
+        ), []
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
         try:
@@ -282,7 +285,7 @@ def draw_outlines() -> None:
 
     gpu.state.blend_set("ALPHA")
     try:
-        for step, edit, is_chosen in _outlined(context.scene):
+        for step, edit, is_chosen in _outlined(context.scene.softground.ground):
             width = overlay.BOLD_LINE if is_chosen else overlay.LINE
             colour = overlay.SIDES.get(step.side, overlay.SIDES[""])
             overlay.draw_line(overlay.closed(step.outline(edit)) * metre, colour, width)
@@ -300,7 +303,7 @@ def draw_numbers() -> None:
 
     metre = 1.0 / context.scene.unit_settings.scale_length
     blf.size(0, overlay.TEXT_SIZE * context.preferences.system.ui_scale)
-    for step, edit, _ in _outlined(context.scene):
+    for step, edit, _ in _outlined(context.scene.softground.ground):
         middle = step.outline(edit).mean(axis=0) * metre
         place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
         if place is not None:
@@ -313,15 +316,14 @@ def draw_numbers() -> None:
         overlay.draw_line(overlay.closed(corners), overlay.SIDES[""], overlay.LINE)
 
 
-def _outlined(scene: bpy.types.Scene) -> list[tuple[BakedStep, StepEdit, bool]]:
+def _outlined(ground: bpy.types.Object | None) -> list[tuple[BakedStep, StepEdit, bool]]:
     """Which steps are outlined, where, and which of them is chosen: while one is picked, all of them."""
-    ground = scene.softground.ground
     if ground is None or not baked_ground.is_baked(ground):
         return []
     chosen = session.chosen_steps()
     return [
         (step, state.edits.get(step.name, step.edit), step.name in (*chosen, state.under))
-        for step in baked_steps.of(scene)
+        for step in baked_steps.of(ground)
         if state.picking or step.name in chosen
     ]
 

@@ -62,10 +62,10 @@ class OnStep(OnSteps):
     def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
         """The steps that are meant, first the one that the panel shows."""
         if not self.step:
-            self.step = "\n".join(step.name for step in baked_steps.chosen(scene))
+            self.step = "\n".join(step.name for step in baked_steps.chosen(scene.softground.ground))
         if not self.step:
             raise InputError("Select a step first, in the list of steps.")
-        steps = {step.name: step for step in baked_steps.of(scene)}
+        steps = {step.name: step for step in baked_steps.of(scene.softground.ground)}
         for name in self.step.split("\n"):
             if name not in steps:
                 raise InputError(f"The bake has no step '{name}': select one in the list of steps.")
@@ -106,19 +106,19 @@ def _edited(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], chosen: list[
     return chosen
 
 
-def changed(scene: bpy.types.Scene, changes: Iterable[tuple[BakedStep, StepEdit | None]]) -> dict[str, StepEdit]:
+def changed(ground: bpy.types.Object, changes: Iterable[tuple[BakedStep, StepEdit | None]]) -> dict[str, StepEdit]:
     """All edits of the bake, with others of some steps; see `edits.with_edit`."""
-    edits = dict(baked_ground.edits_of(scene.softground.ground))
+    edits = dict(baked_ground.edits_of(ground))
     for step, edit in changes:
         edits = with_edit(edits, step.baked, step.name, edit)
     return edits
 
 
 def copied(
-    scene: bpy.types.Scene, copies: Iterable[tuple[BakedStep, StepEdit]]
+    ground: bpy.types.Object, copies: Iterable[tuple[BakedStep, StepEdit]]
 ) -> tuple[dict[str, StepEdit], list[str]]:
     """All edits of the bake with copies of some steps, and their names."""
-    edits, names = dict(baked_ground.edits_of(scene.softground.ground)), []
+    edits, names = dict(baked_ground.edits_of(ground)), []
     for step, edit in copies:
         names.append(new_copy(edits, step.baked))
         edits[names[-1]] = edit
@@ -152,7 +152,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        step = next((item for item in baked_steps.of(scene) if item.name == self.step), None)
+        step = next((item for item in baked_steps.of(scene.softground.ground) if item.name == self.step), None)
         if step is None:
             return {"CANCELLED"}
         if self.extend:
@@ -161,7 +161,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
             session.choose_steps(step.name)
         if step.name in session.chosen_steps():
             scene.frame_set(step.there_from)
-            show_prints.centre(scene, context.area, step)
+            show_prints.centre(scene.unit_settings.scale_length, context.area, step)
         session.redraw()
         session.redraw(region_type="WINDOW")
         return {"FINISHED"}
@@ -176,14 +176,17 @@ class SOFTGROUND_OT_mute_step(OnStep, EditJob):
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
         steps = self.chosen(scene)
         mute = not steps[0].edit.mute
-        return changed(scene, [(step, replace(step.edit, mute=mute)) for step in steps]), []
+        return changed(scene.softground.ground, [(step, replace(step.edit, mute=mute)) for step in steps]), []
 
 
 def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
     """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
     scene = settings.scene_of(context)
-    steps = baked_steps.of(scene)
-    meshes = {*step_soles.names(scene), *mesh_soles({step.name: step.edit for step in steps})}
+    steps = baked_steps.of(scene.softground.ground)
+    meshes = {
+        *step_soles.names(scene.objects, scene.softground.ground),
+        *mesh_soles({step.name: step.edit for step in steps}),
+    }
     names = [*sorted(steps[0].feet if steps else ()), *sorted(meshes)]
     return [name for name in names if text.lower() in name.lower()]
 
@@ -270,7 +273,7 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         mesh = None
         if "sole" in new:
             new["mesh"] = mesh = _mesh(scene, steps, self.sole)
-        edits = changed(scene, [(step, replace(step.edit, **new)) for step in steps])
+        edits = changed(scene.softground.ground, [(step, replace(step.edit, **new)) for step in steps])
         return with_meshes(edits, {self.sole: mesh}) if mesh else edits, []
 
 
@@ -291,7 +294,7 @@ def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> Mesh
             )
     if sole in steps[0].feet:
         return None
-    obj = step_soles.object_of(scene, sole)
+    obj = step_soles.object_of(scene.objects, sole)
     soles = mesh_soles(baked_ground.edits_of(scene.softground.ground))
     if obj is None and sole not in soles:
         feet = ", ".join(sorted(steps[0].feet)) or "none"
@@ -308,7 +311,7 @@ class SOFTGROUND_OT_duplicate_step(OnStep, EditJob):
     bl_label = "Duplicate"
 
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        return copied(scene, [(step, _moved(step, step.ahead())) for step in self.chosen(scene)])
+        return copied(scene.softground.ground, [(step, _moved(step, step.ahead())) for step in self.chosen(scene)])
 
 
 class SOFTGROUND_OT_add_step(OnStep, EditJob):
@@ -335,7 +338,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
             )
         if self.sole:
             edit = replace(edit, sole=self.sole, mesh=_mesh(scene, [step], self.sole))
-        return copied(scene, [(step, replace(edit, mute=False, shift_frames=shift))])
+        return copied(scene.softground.ground, [(step, replace(edit, mute=False, shift_frames=shift))])
 
 
 def _moved(step: BakedStep, move: Sequence[float]) -> StepEdit:
@@ -354,7 +357,7 @@ class SOFTGROUND_OT_reset_step(OnStep, EditJob):
     bl_label = "Reset Step"
 
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        return changed(scene, [(step, None) for step in self.chosen(scene)]), []
+        return changed(scene.softground.ground, [(step, None) for step in self.chosen(scene)]), []
 
 
 class SOFTGROUND_OT_reset_steps(OnSteps, EditJob):

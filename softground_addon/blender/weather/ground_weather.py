@@ -55,7 +55,6 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
 
     Parameters
     ----------
-    ground : bpy.types.Object
     left : BakeRecord, optional
         What its bake left, where that need not be read.
     preset : str, optional
@@ -147,11 +146,11 @@ def _fit(
     with damage_named(ground):
         inputs = about["inputs"]
         (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
-        stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
-        first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
-    up = ground_surface.up_of(display_mesh, unit_scale)
+        first, last = (frame * units.time_stretch for frame in baked_ground.frames_of(inputs))
+        rate = units.frame_rate * units.time_stretch
+    up = ground_surface.up_of(display_mesh, units.unit_scale_m)
     since = places.times[:, 1]
-    span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
+    span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate)
     mesh = ground_mesh.mesh_of(display_mesh)
     hollows = store(mesh, places, matter, span)
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
@@ -178,13 +177,12 @@ def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[
     for damage.
     """
     inputs = about["inputs"]
-    units = baked_ground.units_of(inputs)
     material = {name: baked_ground.baked_with(about, name) for name in ("blur_sigma", "layer_depth")}
     matter = matter_of(str(inputs["surface"]), material["layer_depth"], section_of(footprints))
     material["layer_depth"] *= baked_ground.baked_with(about, "densest") or 1.0  # how far it can be pressed
     known = {
-        "cell_size": units["cell_size_m"],
-        "time_stretch": units["time_stretch"],
+        "cell_size": baked_ground.unit_of(inputs, "cell_size_m"),
+        "time_stretch": baked_ground.unit_of(inputs, "time_stretch"),
         "felt": felt_in(inputs) is not None,
         "puddles": matter.soaking is not None,
         **material,
@@ -196,7 +194,7 @@ def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mappin
     """What weather needs to know of the vertices."""
     display_mesh = baked_ground.display_mesh_of(ground)
     with damage_named(ground):
-        (known, _), unit_scale = of_bake(footprints, about), baked_ground.units_of(about["inputs"])["unit_scale_m"]
+        (known, _), unit_scale = of_bake(footprints, about), baked_ground.unit_of(about["inputs"], "unit_scale_m")
     name = settings.name_of(display_mesh)
     position = ground_surface.undisturbed_surface(display_mesh, unit_scale).vertices
     yield READING
@@ -226,9 +224,11 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
     """
     pressed, since, compacted = places.times.T
-    capacity, above, left = places.pool.T
+    capacity, above, remaining = places.pool.T
     rise, filled = places.levels[:, :POWERS], 1 + moment_of(places.levels[:, POWERS], span)
-    each, of_wet = np.unique(np.column_stack([capacity, left, filled, rise])[capacity > 0], axis=0, return_inverse=True)
+    each, of_wet = np.unique(
+        np.column_stack([capacity, remaining, filled, rise])[capacity > 0], axis=0, return_inverse=True
+    )
     hollow = np.zeros(len(capacity), dtype=np.intp)
     hollow[capacity > 0] = 1 + of_wet.ravel()
     values: dict[str, NDArray[Any]] = {

@@ -22,37 +22,38 @@ MOST_SNOW, ROUNDS = 100.0, 40
 """Most snowfall [cm/h], and how often the range in which it is sought is halved."""
 
 
-def modifier_of(scene: bpy.types.Scene) -> Any:
+def modifier_of(ground: bpy.types.Object | None) -> Any:
     """The weather on a scene's ground; None where there is none."""
-    ground = scene.softground.ground
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
     return modifier if modifier and modifier.node_group and within(modifier.node_group) else None
 
 
 def hours(scene: bpy.types.Scene) -> float:
-    """How long the scene lasts in the time of its weather, whose scale is not keyed [h]."""
-    modifier = modifier_of(scene)
-    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(scene, modifier) / HOUR if modifier else 0.0
+    """Length of the scene in the time of its weather, whose scale is not keyed [h]."""
+    modifier = modifier_of(scene.softground.ground)
+    if not modifier:
+        return 0.0
+    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(*_span(scene, modifier)) / HOUR
 
 
 def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
     """Have the scene last so long [h]; as much snow lies at its end as before."""
-    if modifier := modifier_of(scene):
+    if modifier := modifier_of(scene.softground.ground):
         depth = snow_cm(scene)
-        _write(modifier, "Time Scale", wanted * HOUR / _seconds(scene, modifier))
+        _write(modifier, "Time Scale", wanted * HOUR / _seconds(*_span(scene, modifier)))
         set_snow_cm(scene, depth)
 
 
 def snow_cm(scene: bpy.types.Scene) -> float:
     """Depth of the new snow on open ground at the end of the scene [cm]."""
-    modifier = modifier_of(scene)
-    return _cover_cm(scene, modifier)() if modifier else 0.0
+    modifier = modifier_of(scene.softground.ground)
+    return _cover_cm(modifier, scene.softground.material.surface, *_span(scene, modifier))() if modifier else 0.0
 
 
 def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
     """Let so much snow fall that it lies that deep at the end [cm], or the most that can fall."""
-    if modifier := modifier_of(scene):
-        cover = _cover_cm(scene, modifier)
+    if modifier := modifier_of(scene.softground.ground):
+        cover = _cover_cm(modifier, scene.softground.material.surface, *_span(scene, modifier))
         least, most = 0.0, MOST_SNOW if wanted > 0 else 0.0
         for _ in range(ROUNDS if most else 0):
             middle = (least + most) / 2
@@ -60,10 +61,9 @@ def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
         _write(modifier, "Snowfall", most)
 
 
-def _cover_cm(scene: bpy.types.Scene, modifier: Any) -> Callable[..., float]:
+def _cover_cm(modifier: Any, surface: str, span: Span, end: float) -> Callable[..., float]:
     """Depth of new snow at the end [cm] as a function of the snowfall [cm/h], by default that of the slider."""
-    span, end = _span(scene, modifier)
-    rates, matter = weather_keys.rates(modifier, span), matter_of(scene.softground.material.surface, 0.0, 1.0)
+    rates, matter = weather_keys.rates(modifier, span), matter_of(surface, 0.0, 1.0)
 
     def cover(snowfall: float | None = None) -> float:
         falls = rates["snowfall"] if snowfall is None else snowfall * 0.01 / HOUR
@@ -81,8 +81,7 @@ def _span(scene: bpy.types.Scene, modifier: Any) -> tuple[Span, float]:
     return span_of(first, max(end, tree[weather_keys.LAST]), settings.frame_rate_of(scene) * stretch), end
 
 
-def _seconds(scene: bpy.types.Scene, modifier: Any) -> float:
-    span, end = _span(scene, modifier)
+def _seconds(span: Span, end: float) -> float:
     return (end - span.first) / span.frame_rate
 
 

@@ -66,7 +66,6 @@ def weathered_points(
 
     Parameters
     ----------
-    ground : bpy.types.Object
     position : (K, 3) float array
         Their undisturbed world positions [m].
     over_time : VertexHistories

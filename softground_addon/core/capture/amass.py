@@ -16,14 +16,12 @@ import zipfile
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array
 from ..numerics.rigid import rotation
 from .captured import check_length
 from .joint_centres import CapturedBody
-
-Array = NDArray[np.float64]
 
 _TREE: tuple[tuple[str, int, tuple[float, float, float]], ...] = (
     ("hips", -1, (0.0, -0.22, 0.03)),

@@ -15,14 +15,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array
 from .c3d_parameters import Parameters
 from .captured import Capture, check_length, metres
 from .plates import plates_of
-
-Array = NDArray[np.float64]
 
 _BLOCK = 512
 _KEY = 0x50

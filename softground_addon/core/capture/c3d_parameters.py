@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 _LONGEST_LABEL_LIST = 256
 """Parameters `LABELS2`, `LABELS3`, ... that go on where one list of 255 names is full."""

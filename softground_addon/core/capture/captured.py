@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0}
 """Units that markers come in [m]."""
@@ -70,7 +68,6 @@ class Capture:
         Frames per second [Hz].
     first_frame : int
         Number of the first frame.
-    plates : tuple of Plate
     """
 
     labels: tuple[str, ...]

@@ -13,14 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
 from .captured import Capture, Plate, bridged
 from .marker_sets import places_of
-
-Array = NDArray[np.float64]
 
 _HALF_WIDTHS = {"knee": 0.065, "ankle": 0.046, "elbow": 0.045, "wrist": 0.032}
 """Distance of a marker on a joint's outer side from its centre, in leg lengths: 58, 41, 41 and 29 mm for an adult."""
@@ -66,7 +64,6 @@ def captured_body(capture: Capture, up: str | None = None) -> CapturedBody:
 
     Parameters
     ----------
-    capture : Capture
     up : str, optional
         The laboratory's upward axis, one of `UPWARD`; by default the one along which the pelvis is above the feet.
 

@@ -8,12 +8,10 @@ The C3D file format, a technical user manual, "Force platform parameters": types
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .c3d_parameters import Parameters
 from .captured import LENGTHS, Plate
-
-Array = NDArray[np.float64]
 
 _CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
 """Channels of the types of plates that are read; pressure mats and plates with tables of their own are not."""

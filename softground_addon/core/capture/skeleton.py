@@ -8,13 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
 from .joint_centres import CapturedBody
-
-Array = NDArray[np.float64]
 
 _FLOOR_IS_ZERO = (-0.05, 0.15)
 """Heights of the lowest markers in leg lengths at which the laboratory's floor is where its axes begin."""

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.surfaces import CarriedFilm
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 ZONES = ("heel", "arch", "ball", "toes")
 ZONE_ENDS = (0.30, 0.55, 0.80)
@@ -57,7 +56,7 @@ class CarriedMass:
     on_soles: float = 0.0
 
     def __add__(self, other: CarriedMass) -> CarriedMass:
-        return CarriedMass(*(one + more for one, more in zip(vars(self).values(), vars(other).values(), strict=True)))
+        return CarriedMass(*(mass + more for mass, more in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
 def zone_of(along: Array) -> NDArray[np.intp]:
@@ -83,7 +82,6 @@ def share_left(pressure: Any, carried: CarriedFilm, slid: float = 0.0) -> Any:
     ----------
     pressure : float or array
         Largest during the contact [Pa].
-    carried : CarriedFilm
     slid : float
         Distance that the sole slides, in sole lengths: from 1 on it leaves twice as much.
     """
@@ -97,8 +95,6 @@ def carry(
 
     Parameters
     ----------
-    meetings : iterable of Meeting
-    carried : CarriedFilm
     areas : (4,) float array
         Of the sole's zones [m²].
     brought : float
@@ -120,8 +116,8 @@ def carry(
             booked += CarriedMass(picked_up=picked_up, shed=meeting.shed)
         else:
             gives = np.where(now < TRACE * carried.most, 0.0, now)
-            left = gives * meeting.shares
-            now = now - left
-            booked += CarriedMass(left_behind=float(left @ areas))
+            left_behind = gives * meeting.shares
+            now = now - left_behind
+            booked += CarriedMass(left_behind=float(left_behind @ areas))
         giving.append(gives)
     return giving, replace(booked, on_soles=float(now @ areas))

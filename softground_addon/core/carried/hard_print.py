@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.hard_ground import HardOnSoft, up_to
 from ..ground.terrain import SAME_LAYER
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction, distance_beyond
 from .film import zone_of
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ALONG_SOLE = 14
 """Nodes of the grid along a sole: 2 cm for an adult. The outline between them is that of the distances to it."""
@@ -146,12 +143,10 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
 
     Parameters
     ----------
-    grid : SoleGrid
     poses : (T, P, 4, 4) float array
         Of the sole's patches during the contact.
     force : (T,) float array
         Normal force [N].
-    terrain : HardOnSoft
     tolerance : float
         Height above a node up to which a surface is its floor [m].
     """
@@ -170,13 +165,13 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
     height = position[grid.faces, 2]
     is_even = np.ptp(height, axis=1) <= STEEPEST * grid.spacing  # false where a corner has no floor
     faces = grid.faces[is_even & (largest[grid.faces] > 0).any(axis=1)]
-    kept = np.zeros(len(largest), bool)
-    kept[faces] = True
+    retained = np.zeros(len(largest), bool)
+    retained[faces] = True
     touched = np.where(largest > 0, (pressure > 0).argmax(axis=0), len(pressure))
     first = touched[faces].min(axis=1, initial=len(pressure))
     beside = touched.copy()
     np.minimum.at(beside, faces, first[:, None])
-    return HardPrint(position, largest * kept, np.where(largest > 0, touched, beside), faces)
+    return HardPrint(position, largest * retained, np.where(largest > 0, touched, beside), faces)
 
 
 def _floor(terrain: HardOnSoft, x: Array, y: Array, limit: Array) -> Array:

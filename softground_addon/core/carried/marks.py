@@ -19,13 +19,12 @@ from ..ground.terrain import SAME_LAYER
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.record import EditableStep
 from .film import ZONES, CarriedMass, Meeting, carry, share_left
 from .hard_print import HardPrint, SoleGrid, laid, sole_grid
-
-Array = NDArray[np.float64]
 
 LOOKED_AT = 32
 """Steps of a contact at which it is looked at, about."""
@@ -58,7 +57,6 @@ class Marks:
         See `film.ZONES`.
     floors : FloorSteps
         From which the mass follows.
-    carried : CarriedMass
     """
 
     position: Array
@@ -140,7 +138,7 @@ class FloorSteps:
         booked = CarriedMass()
         for sole in self.soles:
             soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
-            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda one: one[0].frame)
+            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
             giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
             films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
             booked += of_sole
@@ -197,10 +195,8 @@ def marks_of(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     steps : sequence of EditableStep
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
-    terrain : Terrain
     surface : str
         What the ground is made of; a step in another kind of it says so.
     shed : mapping of int to float, optional
@@ -251,7 +247,7 @@ def _of_kind(
     soles = []
     for grid, contacts, sole, tread in laid_out:
         meetings, marks = [], []
-        for contact in sorted(contacts, key=lambda one: one.frames[0]):
+        for contact in sorted(contacts, key=lambda each: each.frames[0]):
             is_wet = contact.wet == kind.name
             share = share_left(contact.laid.pressure, kind.carried, contact.slid)
             of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)

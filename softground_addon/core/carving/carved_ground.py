@@ -45,8 +45,6 @@ class Drawn(NamedTuple):
 
     Attributes
     ----------
-    step : CarvedStep
-    window : Window
     underside : (rows, columns) float array
         Lowest surface over each cell [m], infinite where there is none.
     way : (2,) float array
@@ -67,6 +65,15 @@ def _lowest(parts: Sequence[Drawn], window: Window) -> Array:
             here = window.slices(shared)
             lowest[here] = np.minimum(lowest[here], part.underside[part.window.slices(shared)])
     return lowest
+
+
+def _numbered(triangles: Indices, count: int) -> tuple[Indices, Indices]:
+    """The vertices of triangles (T, 3), of a count, and the triangles as numbers of these."""
+    place = np.zeros(count, dtype=np.intp)
+    place[triangles] = 1
+    used = np.flatnonzero(place)
+    place[used] = np.arange(len(used))
+    return used, place[triangles]
 
 
 class CarvedGround:
@@ -134,23 +141,28 @@ class CarvedGround:
 
     def drawn(self, step: CarvedStep, around: Array, low: Mask, triangles: Indices) -> Drawn | None:
         """A part of a body over a frame, from its vertices (4, V, 3) around it, and which are low; None if none are."""
-        triangles = triangles[low[triangles].any(axis=1)]
+        triangles = triangles[np.logical_or.reduce([low[corners] for corners in triangles.T])]
         if not len(triangles):
             return None
-        used, triangles = np.unique(triangles, return_inverse=True)
-        around, low = around[:, used], low[used]
-        before, after = around[1:3]
-        way = (after - before)[low]
-        distance = np.linalg.norm(way, axis=1)
-        poses = ceil(min(max(distance.max() / step.spacing, 1.0), MOST_POSES))
-        places = cubic(around, 1.0 + np.arange(1, poses + 1) / poses)
-        flat = places[..., :2].reshape(-1, 2)
-        window = Window.around(flat.min(axis=0), flat.max(axis=0), self._cell_size).expanded(self._margin)
-        numbers = triangles.reshape(-1, 3) + len(used) * np.arange(poses)[:, None, None]
+        used, triangles = _numbered(triangles, around.shape[1])
+        around = around[:, used]
+        way = (around[2] - around[1])[:, :2]
+        distance = np.hypot(*way.T) * low[used]
+        needed = np.ceil(np.clip(distance / step.spacing, 1.0, MOST_POSES)).astype(np.int8)
+        of_triangle = np.maximum.reduce([needed[corners] for corners in triangles.T])
+        poses = int(needed.max())
+        between = cubic(np.eye(4), 1.0 + np.arange(1, poses + 1) / poses)
+        places = (between @ around.reshape(4, -1)).reshape(-1, 3)
+        corners = []
+        for number in np.flatnonzero(np.bincount(of_triangle)).tolist():
+            part = triangles[of_triangle == number]
+            corners += [part + len(used) * (-(-poses * pose // number) - 1) for pose in range(1, number + 1)]
+        low_corner, high_corner = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
+        window = Window.around(low_corner, high_corner, self._cell_size).expanded(self._margin)
         origin = (np.array((window.column, window.row)) + 0.5) * self._cell_size
         shape = window.rows, window.columns
-        underside = lowest_surface(places.reshape(-1, 3), numbers.reshape(-1, 3), origin, shape, self._cell_size)
-        return Drawn(step, window, underside, way[distance.argmax(), :2])
+        underside = lowest_surface(places, np.concatenate(corners), origin, shape, self._cell_size)
+        return Drawn(step, window, underside, way[distance.argmax()])
 
     def carve(self, part: Drawn, parts: Sequence[Drawn], frame: float) -> None:
         """Cut the ground to one of the parts that are drawn of bodies."""

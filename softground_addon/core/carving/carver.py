@@ -16,14 +16,11 @@ from dataclasses import dataclass
 from math import ceil, pi, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.material import GroundMaterial
 from ..ground.surfaces import SurfaceRecord
+from ..numerics.arrays import Array, Mask
 from ..pressing.repose import slid
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
@@ -42,7 +39,7 @@ REACH = 0.04
 
 @dataclass(frozen=True)
 class Walls:
-    """How ground stands that was cut.
+    """Walls of ground that was cut.
 
     Attributes
     ----------
@@ -169,9 +166,9 @@ class CarvedCells:
             room = np.maximum(most, 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
-                if remaining <= ROUNDING or not (there := share.sum()):
+                if remaining <= ROUNDING or not (total := share.sum()):
                     break
-                more = np.minimum(share * (remaining / there), room)
+                more = np.minimum(share * (remaining / total), room)
                 self.loose += more
                 room -= more
                 remaining -= float(more.sum())
@@ -199,7 +196,6 @@ class CarvedCells:
 
         Parameters
         ----------
-        walls : Walls
         body : (rows, columns) bool array
             Cells with a body in the ground.
         corner : tuple of int

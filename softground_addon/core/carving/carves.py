@@ -19,15 +19,16 @@ from ..ground.surfaces import find
 from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
+from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
-from ..record.record import BakeRecord
+from ..record.moved_carve import placement, shifted
+from ..record.record import BakeRecord, EditableStep
 from .carved_ground import CarvedGround
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 FRAMES_AT_ONCE = 16
@@ -46,15 +47,13 @@ def with_carves(
 
     Parameters
     ----------
-    left : BakeRecord
     responses : iterable of (CharacterMotion, Response)
     skins : mapping of str to WornSkin
         By the names of the characters, of those whose skin was read.
-    ground : SoftGround
     surface : str
         What it is made of.
     """
-    prints = {step.index: step.left for step in left.steps if step.left is not None}
+    prints = {step.index: _as_the_body_steps(step) for step in left.steps if step.left is not None}
     waders = {print.character for print in prints.values() if is_deep(print)}
     responded = [
         (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
@@ -64,7 +63,16 @@ def with_carves(
     if not responded:
         return left
     walls = Walls.of(find(surface), ground.material, ground.gravity)
-    return replace(left, carves=(yield from carves_of.slices(responded, prints, ground, walls)))
+    carves = yield from carves_of.slices(responded, prints, ground, walls, len(left.footprints))
+    where = {name: replace(placement(edit), shift_frames=0) for name, edit in left.edits.items()}
+    return replace(left, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
+
+
+def _as_the_body_steps(step: EditableStep) -> Footprint:
+    """The print of a step that is left, when its body takes the step, which follows no edit of its time."""
+    assert step.left is not None
+    at = shifted(step.left, -step.edit.shift_frames) if step.edit.shift_frames else step.left
+    return at if at.pressed_by else replace(at, pressed_by=step.baked.pressed_by)
 
 
 @sliced
@@ -73,6 +81,7 @@ def carves_of(
     footprints: Mapping[int, Footprint],
     ground: SoftGround,
     walls: Walls,
+    count: int,
 ) -> Slices[dict[int, Footprint]]:
     """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
 
@@ -82,17 +91,18 @@ def carves_of(
         Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
-    ground : SoftGround
-    walls : Walls
+    count : int
+        Of the steps that bodies take; those of higher numbers are copies.
     """
-    some = next(iter(footprints.values()))
+    first = next(iter(footprints.values()))
     steps = {
-        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(some.cell_size, some.frame_step))
+        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(first.cell_size, first.frame_step))
         for number, footprint in footprints.items()
     }
     frames = skins[0][2].frames
-    carving = CarvedGround(ground, walls, some.cell_size, list(steps.values()), skins[0][2].frame_rate)
-    bodies = [_Body(name, soles, skin, list(steps.values())) for name, soles, skin in skins]
+    carving = CarvedGround(ground, walls, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
+    taken = [step for number, step in steps.items() if number < count]
+    bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
@@ -120,10 +130,10 @@ class _Body:
 
     def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep]) -> None:
         self.poses = _poses(skin)
-        own = [step for step in steps if step.footprint.character == name]
+        of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         for sole, triangles in skin.triangles.items():
-            taken = own if sole == NO_SOLE else [step for step in own if step.footprint.sole == soles[sole]]
+            taken = of_body if sole == NO_SOLE else [step for step in of_body if step.footprint.sole == soles[sole]]
             if taken:
                 self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
 

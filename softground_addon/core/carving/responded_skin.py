@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from ..legs.grounding import Response, leg_soles
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Indices
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
 from ..rig.recording import Recording
 from ..rig.rig_skin import RigSkin, carried, skinned
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 NO_SOLE = -1
 """In place of the sole of skin that belongs to several, as a trunk does."""
@@ -31,9 +29,6 @@ class WornSkin:
     ----------
     character : str
         Its name.
-    skin : RigSkin
-    bones : RigBones
-    mapping : RigMapping
     recording : Recording
         Of all `skin.bones`.
     """
@@ -72,10 +67,8 @@ class RespondedSkin:
 
     Parameters
     ----------
-    worn : WornSkin
     motion : CharacterMotion
         At the frames of its recording.
-    response : Response
 
     Attributes
     ----------
@@ -131,8 +124,8 @@ def _soles_of_bones(worn: WornSkin) -> Indices:
             if bone:
                 for name in {*family(worn.bones, bone), *above(worn.bones, bone)}:
                     owners.setdefault(name, set()).add(number)
-    found = []
+    soles = []
     for name in worn.skin.bones:
         owned = next((owners[bone] for bone in (name, *above(worn.bones, name)) if bone in owners), set[int]())
-        found.append(next(iter(owned)) if len(owned) == 1 else NO_SOLE)
-    return np.array(found, dtype=np.intp)
+        soles.append(next(iter(owned)) if len(owned) == 1 else NO_SOLE)
+    return np.array(soles, dtype=np.intp)

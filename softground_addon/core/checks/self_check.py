@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..findings import Finding
 from ..ground.heightfield import Terrain
@@ -22,8 +21,6 @@ from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from .skin_check import OFF_SKIN, level_on_slope, skin_check
-
-Array = NDArray[np.float64]
 
 PERSON_LEG = 0.87
 """A person of 1.78 m, hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
@@ -60,7 +57,6 @@ def self_check(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         All that they left.
     terrain : Terrain

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..findings import Finding
 from ..ground.hard_ground import bare, up_to
@@ -15,13 +14,11 @@ from ..loads.contacts import LEAVE_HEIGHT
 from ..loads.estimate import CharacterLoads
 from ..loads.missing_ground import beyond_edge
 from ..motion.motion import CharacterMotion, LowSkin
+from ..numerics.arrays import Array, Mask
 from ..numerics.slices import Slices
 from ..record.footprints import Footprint
 from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 OFF_SKIN = 0.012
 """The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
@@ -132,12 +129,12 @@ class _Touching:
 
     @property
     def rests(self) -> Mask:
-        """When some skin touches and is calm however fast the body is, (F,)."""
+        """True while some skin touches and is calm however fast the body is, (F,)."""
         return np.asarray((self.on & (self.skin.rise < CALM_SPEED * self.skin.height)).any(axis=1))
 
 
 def _resting(height: Array, skin: LowSkin) -> float | None:
-    """How far over the ground the skin rests [m], by the low envelope or where calm skin is lowest most often."""
+    """Height over the ground of resting skin [m], by the low envelope or where calm skin is lowest most often."""
     lowest = height.min(axis=1)
     lowest = lowest[np.isfinite(lowest)]
     if not len(lowest):

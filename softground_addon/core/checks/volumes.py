@@ -22,7 +22,6 @@ def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: 
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     ground : SoftGround
         That they were baked on. Where a print lies on several materials, its rim's share lies between theirs.
     factors : (V, 3) float array, optional

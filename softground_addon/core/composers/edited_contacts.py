@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..motion.sole_motion import SolePatch
+from ..numerics.arrays import Array
 from ..numerics.rigid import inverse, rotation, turn_between, unit
 from ..record.contact_steps import PressingSole, Steps
 from ..record.edits import StepEdit
-
-Array = NDArray[np.float64]
 
 
 def edited_contact(
@@ -26,16 +24,14 @@ def edited_contact(
 
     Parameters
     ----------
-    own : PressingSole
+    sole : PressingSole
         That made the step.
     steps : Steps
         What it did.
     other : PressingSole
         That presses it now; the same where the sole is not swapped.
-    edit : StepEdit
     pivot : (3,) float array
         Middle of the print on the undisturbed ground [m].
-    terrain : Terrain
     """
     steps = swapped(steps, sole, other)
     if edit.scale != 1.0:
@@ -52,8 +48,7 @@ def swapped(steps: Steps, sole: PressingSole, other: PressingSole) -> Steps:
     Parameters
     ----------
     steps : Steps
-        What `own` did.
-    own, other : PressingSole
+        What `sole` did.
     """
     if other is sole:
         return steps
@@ -119,11 +114,8 @@ def _placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length
 
     Parameters
     ----------
-    steps : Steps
-    edit : StepEdit
     pivot : (3,) float array
         Middle of the print on the undisturbed ground [m].
-    terrain : Terrain
     length : float
         Of the sole [m]: the ground's slope is that of a plane as long.
     """

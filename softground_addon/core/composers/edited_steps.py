@@ -12,7 +12,6 @@ from functools import reduce
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.heightfield import HeightField
@@ -34,7 +33,6 @@ from ..record.record import BakeRecord
 from .edited_contacts import edited_contact
 from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
 
-Array = NDArray[np.float64]
 Change = tuple[int, StepEdit]
 """Number of a step, and what was changed of it."""
 
@@ -53,14 +51,12 @@ SLIDING = 0.25
 
 @sliced
 def with_edits(
-    left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float
+    record: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float
 ) -> Slices[BakeRecord]:
     """A record with other edits in place of those that it has.
 
     Parameters
     ----------
-    left : BakeRecord
-    edits : mapping of step id to StepEdit
     ground : SoftGround
         That it was baked on.
     cell_size : float
@@ -71,7 +67,7 @@ def with_edits(
     InputError
         See `EditedSteps.pressed_again`.
     """
-    return (yield from EditedSteps.left_with.slices(EditedSteps(left.footprints, ground, cell_size), left, edits))
+    return (yield from EditedSteps.left_with.slices(EditedSteps(record.footprints, ground, cell_size), record, edits))
 
 
 class EditedSteps:
@@ -107,10 +103,10 @@ class EditedSteps:
         self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
 
     @sliced
-    def left_with(self, left: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
+    def left_with(self, record: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
         """The record that the footprints are of, with other edits; errors as `pressed_again`."""
-        again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(left.footprints, edits))
-        return replace(left, edits=dict(edits), pressed_again=again)
+        again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(record.footprints, edits))
+        return replace(record, edits=dict(edits), pressed_again=again)
 
     @sliced
     def pressed_again(self, edits: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:

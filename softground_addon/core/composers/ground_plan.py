@@ -15,12 +15,9 @@ from ..loads.missed_steps import advice, missed_steps
 from ..motion.motion import CharacterMotion
 from ..motion.props import posed
 from ..motion.sole_motion import SoleMotion, shortest_length
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.cell_keys import Keys, cells_at, cells_of, keys_of
 from ..numerics.slices import Slices, sliced
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 MARGIN = 2.0
 """How far the ground reaches beyond the feet, in lengths of the longest sole."""

@@ -12,13 +12,12 @@ from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..pressing.ground_cells import UndisturbedCells
 from ..record.footprints import Footprint
 from .simulation import FrameResult, Simulation
-
-Array = NDArray[np.float64]
 
 NEWEST = 48
 """Frames at the end of what is shown that are pressed anew first: two steps of a walk at least."""
@@ -32,7 +31,6 @@ class _Change:
     ----------
     frame : float
         Scene frame.
-    windows : tuple of Window
     before, after : tuple of (2, rows, columns) float arrays
         State of each window [m], with the windows taken one after the other.
     contact : tuple of (Window, (rows, columns) bool array)
@@ -56,8 +54,6 @@ class Playhead:
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    ground : SoftGround
     cell_size : float
         Side of a cell [m].
     pressed : HeightField, optional
@@ -67,7 +63,6 @@ class Playhead:
 
     Attributes
     ----------
-    undisturbed : UndisturbedCells
     ground : HeightField
         At the frame that is shown; only to be read.
     contact : SparseGrid

@@ -34,14 +34,16 @@ CELLS_ALONG_SOLE = 60
 """Finer cells show the same depths, to a hundredth."""
 MOST_STEPS = 320
 """Steps that a longer contact is pressed in: 2.7 s, at the usual 120 a second."""
-SAMPLE = 11
-"""Contacts around the median that are pressed into another material, ..."""
+SAMPLE, FEW = 11, 5
+"""Contacts around the median that are pressed into another material, fewer where they are alike, ..."""
 BENEATH = 11
 """... and earlier ones, on which they tread."""
-STEPS_AT_ONCE, BODY_STEPS_AT_ONCE = 32, 1
+STEPS_AT_ONCE, BODY_STEPS_AT_ONCE = 48, 1
 """Steps of a foot and of a body that are pressed in a slice."""
-MATCH_TOLERANCE, CLOSE_ENOUGH = 2e-3, 5e-3
-"""Relative error of a matched depth of the middle contacts, and of all."""
+MATCH_TOLERANCE, CLOSE_ENOUGH, CERTAIN = 1e-2, 5e-3, 4e-2
+"""Relative error of a matched depth of the middle contacts, and of all; and of all where one more guess suffices."""
+ALIKE = 0.03
+"""Relative difference of depths by which contacts are alike."""
 FREE_TRIALS, MOST_TRIALS = 8, 40
 """Moduli that are tried before their interval is halved, and in all."""
 LEAST_POWER, MOST_POWER = 0.1, 3.0
@@ -104,8 +106,6 @@ def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_s
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    ground : SoftGround
     cell_size : float
         Side of a cell of the bake [m].
     """
@@ -154,6 +154,8 @@ def _laid_out(character: CharacterLoads, number: int, cells: UndisturbedCells) -
 
 def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotContacts]:
     """Press all contacts, and choose those that tell the typical depth in other materials."""
+    for contact in contacts:
+        contact.layout.remembers |= len(contacts) <= SAMPLE + BENEATH  # of more, those that are asked about below
     prints = yield from _press(contacts, range(len(contacts)), ground)
     depths = _depths(prints, len(contacts))
     feet = np.array([contact.layout.sole.prop is None for contact in contacts], bool)
@@ -161,17 +163,25 @@ def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotCon
     impulse = np.array([contact.impulse for contact in contacts])[asked]
     typical = asked[typical_contacts(depths[asked], impulse)]
     among = typical if len(typical) else asked[main_contacts(impulse)]
-    beside = max(0, (len(among) - SAMPLE) // 2)
-    sample = among[np.argsort(depths[among], kind="stable")][beside : len(among) - beside].tolist()
-    beneath = _beneath(contacts, sample, prints)
-    for number in sample + beneath:
+    sample = _middle(among[np.argsort(depths[among], kind="stable")], SAMPLE)
+    if len(sample) > FEW and np.ptp(depths[sample]) <= ALIKE * depths[sample].mean():
+        sample = _middle(sample, FEW)
+    beneath = _beneath(contacts, sample.tolist(), prints)
+    for number in [*sample, *beneath]:
         contacts[number].layout.remembers = True
-    return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample, beneath)
+    return ShotContacts(ground, tuple(contacts), depths, median_depth(depths[typical]), sample.tolist(), beneath)
+
+
+def _middle(ordered: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """As many of the ordered numbers from their middle, or one more."""
+    beside = max(0, (len(ordered) - count) // 2)
+    return ordered[beside : len(ordered) - beside]
 
 
 def _press(contacts: Sequence[_Contact], chosen: Iterable[int], ground: SoftGround) -> Slices[dict[int, Footprint]]:
     """Press contacts of these numbers into the ground, one after the other; the prints of those that leave one."""
-    flat = replace(ground.material, rim_reach=0.0, repose_angle=0.0)  # what rises beside a print does not deepen it
+    # What rises beside a print does not deepen it.
+    flat = replace(ground.material, poisson_ratio=0.0, rim_reach=0.0, repose_angle=0.0)
     solvers: dict[int, GroundSolver] = {}
     latest: dict[tuple[int, int], tuple[int, OpenContact]] = {}
     prints = {}
@@ -220,8 +230,6 @@ def matching_modulus(
 
     Parameters
     ----------
-    contacts : ShotContacts
-    material : GroundMaterial
     depth : float
         Wanted depth of the typical print [m].
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
@@ -236,14 +244,20 @@ def matching_modulus(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and that of the layer when "
             f"packed, {material.deepest * 100:.3g} cm."
         )
-    middle = contacts.sample[(len(contacts.sample) - 1) // 2 : len(contacts.sample) // 2 + 1]
-    few = replace(contacts, sample=middle, beneath=[])
-    for among, tolerance in ((few, MATCH_TOLERANCE), (contacts, CLOSE_ENOUGH)):
-        tried = yield from _tried(among, material, depth, pressure, tolerance)
-        modulus, reached = tried[-1]
-        if matched := abs(reached - depth) <= tolerance * depth:
-            material = replace(material, youngs_modulus=modulus)
-    if matched:
+    middle = _middle(np.array(contacts.sample, int), 1).tolist()
+    few, pressed = replace(contacts, sample=middle, beneath=[]), contacts.ground.material
+    tried = []
+    if contacts.ground.pressure == pressure and pressed == replace(material, youngs_modulus=pressed.youngs_modulus):
+        tried = [(pressed.youngs_modulus, median_depth(contacts.depths[middle]))]
+    yield from _try(few, material, depth, pressure, MATCH_TOLERANCE, tried)
+    modulus, near = tried[-1]
+    reached = yield from typical_depth.slices(contacts, replace(material, youngs_modulus=modulus), pressure)
+    if near and abs(reached - depth) <= CERTAIN * depth:
+        return next_modulus([(before, deep * reached / near) for before, deep in tried], depth, material)
+    tried = [(modulus, reached)]
+    yield from _try(contacts, material, depth, pressure, CLOSE_ENOUGH, tried)
+    modulus, reached = tried[-1]
+    if abs(reached - depth) <= CLOSE_ENOUGH * depth:
         return modulus
     if not any(reached for _, reached in tried):
         raise InputError(TAKES_NO_PRINT)
@@ -253,19 +267,21 @@ def matching_modulus(
     )
 
 
-def _tried(
-    contacts: ShotContacts, material: GroundMaterial, depth: float, pressure: Pressure, tolerance: float
-) -> Slices[list[tuple[float, float]]]:
-    """The moduli [Pa] on the way to a depth [m], from that of the material on, with the depths that they gave."""
-    tried: list[tuple[float, float]] = []
-    modulus = material.youngs_modulus
+def _try(
+    contacts: ShotContacts,
+    material: GroundMaterial,
+    depth: float,
+    pressure: Pressure,
+    tolerance: float,
+    tried: list[tuple[float, float]],
+) -> Slices[None]:
+    """Add the moduli [Pa] on the way to a depth [m], with their depths; the first is that of the material."""
     while len(tried) < MOST_TRIALS:
+        modulus = next_modulus(tried, depth, material) if tried else material.youngs_modulus
         reached = yield from typical_depth.slices(contacts, replace(material, youngs_modulus=modulus), pressure)
         tried.append((modulus, reached))
         if abs(reached - depth) <= tolerance * depth or (modulus == SOFTEST and reached < depth):
             break
-        modulus = next_modulus(tried, depth, material)
-    return tried
 
 
 def next_modulus(tried: Sequence[tuple[float, float]], depth: float, material: GroundMaterial) -> float:

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks.volumes import check_volumes
+from ..errors import InputError
 from ..findings import Finding
+from ..ground.deep_ground import wading
+from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
 from ..loads.estimate import CharacterLoads
-from ..motion.motion import CharacterMotion
-from ..numerics.slices import Slices
+from ..motion.motion import CharacterMotion, shortest_sole
+from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
 from ..settings import TIME_LIMIT, BakeSettings
 from .edited_steps import with_edits
+from .prediction import pressed_contacts
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
 from .shot_loads import loads_of_shot
 from .simulation import simulate
@@ -33,12 +37,10 @@ class PressedShot:
 
     Attributes
     ----------
-    loads : list of CharacterLoads
     left : BakeRecord
         Its steps, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
-    responses : list of CharacterResponse
     """
 
     loads: list[CharacterLoads]
@@ -47,26 +49,40 @@ class PressedShot:
     responses: list[CharacterResponse]
 
 
+@sliced
+def loads_standing(
+    wanted: BakeSettings, motions: Sequence[CharacterMotion], terrain: Terrain
+) -> Slices[tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]]:
+    """The motions of a shot as they will walk on the terrain, and their loads; errors as of `loads_of_shot`."""
+    standing = yield from standing_on.slices(motions, terrain, wanted.response)
+    return standing, (yield from loads_of_shot.slices(wanted, standing, terrain))
+
+
 def press_shot(
     wanted: BakeSettings,
     motions: Sequence[CharacterMotion],
+    standing: Sequence[CharacterMotion],
+    loads: list[CharacterLoads],
     ground: SoftGround,
     edits: Mapping[str, StepEdit],
     factors: Array | None = None,
+    seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, PressedShot]:
-    """Loads, footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
+    """Footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
     lean that the pressed ground gives is the lean that pressed it.
 
     Parameters
     ----------
-    wanted : BakeSettings
-    motions : sequence of CharacterMotion
-    ground : SoftGround
-    edits : mapping of step id to StepEdit
+    motions, standing : sequence of CharacterMotion
+        As they were read, and as they will walk.
+    loads : list of CharacterLoads
+        From `loads_standing`.
     factors : (V, 3) float array, optional
         What is painted on the ground.
+    seen : list of Footprint, optional
+        Takes each print once its contact ends, for who looks on; where bodies lean, once more in each pass.
 
     Yields
     ------
@@ -76,14 +92,14 @@ def press_shot(
     Raises
     ------
     InputError
-        If nobody touches the ground, or the cells are too small for the shot.
+        If the cells are too small for the shot.
     BakeError
         If a footprint breaks an invariant.
     """
     terrain, asked = ground.terrain, wanted.response
-    standing = yield from standing_on.slices(motions, terrain, asked)
-    loads = yield from loads_of_shot.slices(wanted, standing, terrain)
-    footprints, forces = yield from _simulate(wanted, loads, ground)
+    if wanted.carves:
+        yield from _check_carving(wanted, loads, ground)
+    footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     before = None
     for _ in range(LEAN_PASSES):
         left = yield from _edited(wanted, ground, footprints, edits)
@@ -94,12 +110,22 @@ def press_shot(
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground)
+        footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     check_volumes(footprints, ground, factors)
     yield None
     left = yield from _edited(wanted, ground, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, left, asked)
     return PressedShot(loads, left, forces, responses)
+
+
+def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
+    """Raise InputError if legs would carve the ground for longer, or more of it, than the bake may take."""
+    try:
+        check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s, set_by=TIME_LIMIT)
+    except InputError as error:  # if it is deep
+        depths = (yield from pressed_contacts.slices(loads, ground, wanted.cell_size_m)).depths
+        if wading(depths.max(initial=0.0), shortest_sole([character.motion for character in loads])) > 0:
+            raise InputError(f"Legs carve deep ground. {error} Or turn Carve off.") from None
 
 
 def _edited(
@@ -110,7 +136,7 @@ def _edited(
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround
+    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
@@ -119,6 +145,8 @@ def _simulate(
     forces: list[tuple[Array, ...]] = []
     for result in simulate(loads, ground, wanted.cell_size_m):
         footprints += result.footprints
+        if seen is not None:
+            seen += result.footprints
         frames.append(result.frame)
         if wanted.keep_forces:
             forces.append(result.forces)

@@ -8,20 +8,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.surfaces import SURFACES
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
 from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps
 from ..relief.tread import PATTERNS, SoleTread, of_map
 from ..settings import BakeSettings
-
-Array = NDArray[np.float64]
 
 BARS = ("HIKING", "TRAINER")
 """Patterns that materials may draw as bars across a print, where the mesh is too coarse for the pattern itself."""

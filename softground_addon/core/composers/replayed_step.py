@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import ROW, Keys
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Imprints, Timing
 from ..pressing.solver import GroundSolver
 from ..record.contact_steps import Steps
 from ..record.footprints import QUANTUM, Changes, Footprint
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,6 @@ class StepGrid:
 
     Attributes
     ----------
-    timing : Timing
     begin : float
         Scene frame of step 0.
     """
@@ -109,7 +107,7 @@ class ReplayedStep:
             weathered.press(window, after - before)
 
     def _known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
-        """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""
+        """Frame by which each cell of its window changed last, and the cells in contact, as `WeatheredCells.note`."""
         footprint, window = self._footprint, self._footprint.window
         last, touched = np.full(window.cells, -np.inf), np.zeros(window.cells, bool)
         for frames, first, cells, _ in self._changes:

@@ -1,4 +1,4 @@
-"""How the characters of a shot respond to the ground that they press, and what is said of it."""
+"""Responses of the characters of a shot to the ground that they press, and what is said of them."""
 
 from __future__ import annotations
 
@@ -40,8 +40,6 @@ class CharacterResponse:
     ----------
     motion : CharacterMotion
         The source, at scene frames.
-    response : Response
-    before, after : Gaps
     sinkage : float
         Mean depth of the character's prints [m].
     out_of_reach : tuple of OutOfReach
@@ -114,20 +112,20 @@ def responses_of(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    left: BakeRecord,
+    record: BakeRecord,
     options: ResponseOptions | None,
 ) -> Slices[list[CharacterResponse]]:
     """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps."""
     responses: list[CharacterResponse] = []
     if options is None:
         return responses
-    history = GroundHistory(terrain, left.edited)
+    history = GroundHistory(terrain, record.edited)
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
-        followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
-        standing = leaving_early(motion, touching, left.edited) if options.grounding else touching
+        followed = follow(motion, touching, record.footprints, record.edits) if options.grounding else Followed()
+        standing = leaving_early(motion, touching, record.edited) if options.grounding else touching
         yield
         response = yield from respond.slices(
             motion,
@@ -142,7 +140,7 @@ def responses_of(
         before = yield from gaps.slices(motion, standing, history)
         yield
         after = yield from gaps.slices(responding(motion, response), standing, history)
-        sinkage = mean_sinkage(left.edited, motion.name)
+        sinkage = mean_sinkage(record.edited, motion.name)
         responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses
 
@@ -168,15 +166,15 @@ def gap_table(
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         yield
-        left = yield from gaps.slices(motion, touching, history)
-        table[motion.name] = _statistics(left)
+        remaining = yield from gaps.slices(motion, touching, history)
+        table[motion.name] = _statistics(remaining)
     return {"before": table, "after": table}
 
 
 def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
-    """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
-    left = gaps_mm.get("after", gaps_mm["before"])
-    return max((of_character["float"]["p95"] for of_character in left.values()), default=0.0)
+    """Height of feet above their prints, apart from a few frames [mm], of a report's gaps."""
+    remaining = gaps_mm.get("after", gaps_mm["before"])
+    return max((of_character["float"]["p95"] for of_character in remaining.values()), default=0.0)
 
 
 def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:

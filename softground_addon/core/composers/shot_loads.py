@@ -28,9 +28,6 @@ def loads_of_shot(
 
     Parameters
     ----------
-    wanted : BakeSettings
-    motions : sequence of CharacterMotion
-    terrain : Terrain
     known : iterable of (CharacterMotion, CharacterLoads)
         The loads of motions that were looked at before: where one of them is met again they are taken over.
 

@@ -16,7 +16,7 @@ from ..ground.sparse_grid import Window
 from ..imprints.sole_points import SolePoints, flat_pose, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.tracks import tracks
-from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -25,8 +25,6 @@ from ..pressing.sole_layout import SoleLayout
 from ..pressing.solver import GroundSolver
 from ..record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
 from ..record.footprints import Footprint
-
-Array = NDArray[np.float64]
 
 MOST_VERTICES = 20_000
 """Most vertices of a contact shape that is kept with its prints, so that they can be moved."""
@@ -72,7 +70,6 @@ def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: flo
     ----------
     loads : sequence of CharacterLoads
         Characters that share the ground, on time grids of the same step.
-    ground : SoftGround
     cell_size : float
         Side of a cell [m].
 
@@ -95,7 +92,6 @@ class Simulation:
 
     Parameters
     ----------
-    ground : SoftGround
     state : HeightField
         What was pressed of it so far, empty or from `footprints.recompose`; it is worked on.
     undisturbed : UndisturbedCells, optional
@@ -156,7 +152,7 @@ class _Waiting:
             earlier = self._latest.get(contact.of)
             goes_on = earlier is not None and earlier.layout.end == contact.since
             layout = contact.layout(self._frames)
-            opened = OpenContact(layout, earlier if goes_on else None, contact.kept(layout.steps))
+            opened = OpenContact(layout, earlier if goes_on else None, contact.recorded(layout.steps))
             self._latest[contact.of] = opened
             yield opened
 
@@ -167,7 +163,6 @@ class ShotContact:
 
     Attributes
     ----------
-    character : CharacterLoads
     of : (int, int)
         Number of the character and of its sole.
     during : slice
@@ -188,12 +183,12 @@ class ShotContact:
     points: SolePoints | None
     pressing: PressingSole | None
 
-    def kept(self, steps: Steps) -> ContactSteps | None:
+    def recorded(self, steps: Steps) -> ContactSteps | None:
         """What its footprint keeps of its steps."""
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
     def layout(self, frames: Array, stride: int = 1) -> ContactLayout:
-        """How it is laid out, at steps of the time grid that are at these scene frames; at each of so many only."""
+        """Its layout, at steps of the time grid that are at these scene frames; at each of so many only."""
         motion, contacts, forces = self.character.motion, self.character.contacts, self.character.forces
         index, during = self.of[1], slice(self.during.start, self.during.stop, stride)
         sole, poses = motion.soles[index].sole, motion.soles[index].transforms
@@ -209,10 +204,6 @@ class ShotContact:
         if self.points is None:
             return PropLayout(motion.name, sole, steps)
         return SoleLayout(motion.name, sole, steps, self.points)
-
-
-def _is_kept(sole: Sole) -> bool:
-    return sole.prop is None or len(sole.prop.vertices) <= MOST_VERTICES
 
 
 def contacts_of(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[ShotContact]:
@@ -240,7 +231,6 @@ class TimeGrid:
         Steps at whole frames.
     offsets : list of int
         Step at which each character appears.
-    timing : Timing
     """
 
     frames: Array
@@ -275,7 +265,7 @@ def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
 def _state_at(
     loads: Sequence[CharacterLoads], offsets: Sequence[int], step: int
 ) -> tuple[tuple[NDArray[np.bool_], ...], tuple[Array, ...]]:
-    """Which soles touch, and the force on each, at a step of the common grid; nothing outside a character's time."""
+    """Soles that touch, and the force on each, at a step of the common grid; nothing outside a character's time."""
     touching, forces = [], []
     for character, offset in zip(loads, offsets, strict=True):
         index = step - offset

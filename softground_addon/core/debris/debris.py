@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from ..ground import crumbs, surfaces
 from ..ground.surfaces import ThrownMatter
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from ..record.throws import AIM, WEIGHT, Throw, ThrowKind
 from . import flight
 
-Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
 
 GRAINS = (0.2e-3, 0.6e-3)
@@ -130,10 +130,8 @@ def sources(
 
     Parameters
     ----------
-    thrown : sequence of Throw
     steps : sequence of EditableStep
         With all of their rims.
-    surface : str
     gravity : float
         [m/s²]
     """
@@ -185,9 +183,8 @@ def throw(
 
     Parameters
     ----------
-    found : sequence of Source
-        From `sources`.
-    surface : str
+    sources : sequence of Source
+        Result of the function of that name.
     gravity : float
         [m/s²]
     height : callable
@@ -199,27 +196,27 @@ def throw(
     kinds = 2 * sum(source.throw.kind != ThrowKind.SHED for source in throwing)  # pieces and grains
     parts = []
     for source in throwing:
-        left = source.step.left
-        matter = surfaces.find((left and left.surface) or surface).thrown
+        footprint = source.step.left
+        matter = surfaces.find((footprint and footprint.surface) or surface).thrown
         parts.append(_pieces(source, matter, gravity, ALL_PIECES // max(kinds, 1)))
         yield
     return (yield from _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None))
 
 
-def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float) -> float:
+def _volume(throw: Throw, footprint: Footprint, matter: ThrownMatter, gravity: float) -> float:
     """Volume thrown by a step that left a print [m³]."""
     amount = float(throw.samples[:, WEIGHT].astype(np.float64).sum())
     if throw.kind == ThrowKind.LANDING:
-        share = thrown_share(throw.speed, _radius(throw, left), gravity)
-        return share * left.compressed_m3 * _landing_part(left, throw.landed_by) if share else 0.0
+        share = thrown_share(throw.speed, _radius(throw, footprint), gravity)
+        return share * footprint.compressed_m3 * _landing_part(footprint, throw.landed_by) if share else 0.0
     if throw.kind == ThrowKind.PUSH:
-        return np.sqrt(left.area_m2) / 2 * PUSH_DEPTH * amount
-    return matter.film * left.area_m2 * amount
+        return np.sqrt(footprint.area_m2) / 2 * PUSH_DEPTH * amount
+    return matter.film * footprint.area_m2 * amount
 
 
-def _radius(throw: Throw, left: Footprint) -> float:
+def _radius(throw: Throw, footprint: Footprint) -> float:
     """Of the part of the sole that lands [m]: half a foot, the whole of all else."""
-    return float(np.sqrt(max(left.area_m2, 1e-8) * (0.5 if throw.is_foot else 1.0) / np.pi))
+    return float(np.sqrt(max(footprint.area_m2, 1e-8) * (0.5 if throw.is_foot else 1.0) / np.pi))
 
 
 def _landing_part(footprint: Footprint, until: float) -> float:
@@ -286,9 +283,9 @@ def _radii(volume: float, sizes: tuple[float, float], most: int, random: np.rand
 
 def _corona(source: Source, random: np.random.Generator, count: int, gravity: float) -> tuple[Array, Array]:
     """Start and speed of the ring around a landing."""
-    throw, left = source.throw, source.step.left
-    assert left is not None
-    radius = _radius(throw, left)
+    throw, footprint = source.throw, source.step.left
+    assert footprint is not None
+    radius = _radius(throw, footprint)
     (((middle,),), ((along,),)) = throw.followed()
     direction = 2 * np.pi * random.random(count)
     distance = np.sqrt(NEAREST**2 + random.random(count) * (FARTHEST**2 - NEAREST**2))

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import among, keys_at
-
-Array = NDArray[np.float64]
 
 SPOTS = 13
 """Spots that the disk of a piece is taken as, which may reach over several cells."""

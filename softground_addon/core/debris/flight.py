@@ -10,10 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import among, cells_of, keys_of
 from ..numerics.slices import Slices, sliced
-
-Array = NDArray[np.float64]
 
 HALVINGS = 20
 """Of the time between a landing on level ground that is too early and one that is too late: to its millionth part."""
@@ -86,30 +85,30 @@ def landing_times(
     def ground(x: Array, y: Array) -> Array:
         return np.nan_to_num(height(x, y), nan=-np.inf)
 
-    time, left = np.zeros(len(start)), np.arange(len(start))
+    time, aloft = np.zeros(len(start)), np.arange(len(start))
     early, late = _apex(velocity, drag_time, gravity), np.full(len(start), LONGEST_FLIGHT)
     level = start[:, 2].copy()
     for _ in range(ROUNDS):
-        if not len(left):
+        if not len(aloft):
             return time
         yield
-        flying = start[left], velocity[left], drag_time[left]
-        time[left] = down = _down_to(level[left], *flying, gravity)
+        flying = start[aloft], velocity[aloft], drag_time[aloft]
+        time[aloft] = down = _down_to(level[aloft], *flying, gravity)
         place = position(*flying, down, gravity)
         below = ground(place[:, 0], place[:, 1])
-        flies = below < level[left]
-        early[left[flies]], late[left[~flies]] = down[flies], down[~flies]
-        settled = np.isclose(below, level[left], rtol=0.0, atol=SETTLED)
-        level[left] = below
-        left = left[~settled]
-    begin, end, flying = early[left], late[left], (start[left], velocity[left], drag_time[left])
-    for _ in range(HALVINGS if len(left) else 0):
+        flies = below < level[aloft]
+        early[aloft[flies]], late[aloft[~flies]] = down[flies], down[~flies]
+        settled = np.isclose(below, level[aloft], rtol=0.0, atol=SETTLED)
+        level[aloft] = below
+        aloft = aloft[~settled]
+    begin, end, flying = early[aloft], late[aloft], (start[aloft], velocity[aloft], drag_time[aloft])
+    for _ in range(HALVINGS if len(aloft) else 0):
         yield
         middle = (begin + end) / 2
         place = position(*flying, middle, gravity)
         flies = place[:, 2] > ground(place[:, 0], place[:, 1])
         begin, end = np.where(flies, middle, begin), np.where(flies, end, middle)
-    time[left] = end
+    time[aloft] = end
     return time
 
 

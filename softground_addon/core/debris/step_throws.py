@@ -45,10 +45,8 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         That they left.
-    surface : str
     """
     throws: list[Throw] = []
     for character in loads:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.soft_ground import SoftGround, Weathering
 from ..ground.sparse_grid import SparseGrid
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..record.footprints import recompose
 from ..record.record import BakeRecord
@@ -19,12 +19,10 @@ from . import flight
 from .debris import Debris, Height, sources, throw, volumes
 from .step_throws import throws_of
 
-Array = NDArray[np.float64]
-
 
 @sliced
 def thrown(
-    left: BakeRecord,
+    record: BakeRecord,
     ground: SoftGround,
     *,
     surface: str,
@@ -36,10 +34,8 @@ def thrown(
 
     Parameters
     ----------
-    left : BakeRecord
     ground : SoftGround
         Before anything pressed it.
-    surface : str
     cell_size : float
         [m]
     gravity : float
@@ -52,12 +48,12 @@ def thrown(
     InputError
         If what the record says is damaged.
     """
-    if not (left.throws if loads is None else left.footprints):
-        return left, None
+    if not (record.throws if loads is None else record.footprints):
+        return record, None
     if loads is not None:
-        left = replace(left, throws=(yield from throws_of.slices(loads, left.footprints, surface=surface)))
+        record = replace(record, throws=(yield from throws_of.slices(loads, record.footprints, surface=surface)))
     try:
-        return (yield from without_warnings(_thrown(left, ground, surface, cell_size, gravity)))
+        return (yield from without_warnings(_thrown(record, ground, surface, cell_size, gravity)))
     except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
         raise InputError(
             f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
@@ -65,12 +61,12 @@ def thrown(
 
 
 def _thrown(
-    left: BakeRecord, ground: SoftGround, surface: str, cell_size: float, gravity: float
+    record: BakeRecord, ground: SoftGround, surface: str, cell_size: float, gravity: float
 ) -> Slices[tuple[BakeRecord, Debris]]:
-    left = replace(left, thrown={})
-    thrown_by = yield from sources.slices(left.throws, left.steps, surface=surface, gravity=gravity)
-    left = replace(left, thrown=volumes(thrown_by))
-    pressed = recompose(left.shaping, cell_size=cell_size)
+    record = replace(record, thrown={})
+    thrown_by = yield from sources.slices(record.throws, record.steps, surface=surface, gravity=gravity)
+    record = replace(record, thrown=volumes(thrown_by))
+    pressed = recompose(record.shaping, cell_size=cell_size)
     yield
     bare = flight.SampledHeights(ground.terrain.heights, cell_size)  # thousands fall side by side
 
@@ -78,19 +74,19 @@ def _thrown(
         compression, rim = pressed.sample(x, y)
         return np.asarray(bare(x, y) + rim - compression)
 
-    in_weather = _in_weather(left, ground.weathering, height, cell_size)
+    in_weather = _in_weather(record, ground.weathering, height, cell_size)
     pieces = throw.slices(thrown_by, surface=surface, gravity=gravity, height=height, height_at=in_weather)
-    return left, (yield from pieces)
+    return record, (yield from pieces)
 
 
 def _in_weather(
-    left: BakeRecord, weathering: Weathering | None, height: Height, cell_size: float
+    record: BakeRecord, weathering: Weathering | None, height: Height, cell_size: float
 ) -> Callable[[float], Height] | None:
     """Heights at scene frames, where steps feel weather: new snow raises open ground, and steps press it down."""
     if weathering is None:
         return None
     trodden = SparseGrid(cell_size, channels=1)
-    for footprint in left.edited:
+    for footprint in record.edited:
         values = trodden.read(footprint.window)
         values.reshape(-1)[footprint.contact_cells] = 1.0
         trodden.write(footprint.window, values)

@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.smoothing_spline import share_of_noise, smooth_path
 from .centre_of_mass import MassPoints, fitted_to_free_fall, mass_points
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 CUTOFF = 16.0
 """Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, as is usual for

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CENTRE, CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -210,7 +209,6 @@ def fitted_to_free_fall(
 
     Parameters
     ----------
-    points : MassPoints
     accelerations : (M, parts, 3) float array
         Acceleration of each part's centre at steps of free fall [m/s²].
     gravity : float

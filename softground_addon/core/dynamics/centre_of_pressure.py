@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 PRESSED_DEPTH = 0.01
 """Landmarks this much higher than the lowest one bear e times less of the pressure, in leg lengths."""
@@ -55,7 +53,6 @@ def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, ta
 
     Parameters
     ----------
-    motion : CharacterMotion
     lowest : (N, S, 3) float array
         Its `lowest_points` [m].
     share : (N, S) float array

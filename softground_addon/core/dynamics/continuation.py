@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import orthonormal
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import cubic, in_stretches
 from ..numerics.intervals import runs
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SAME_POSE = 1e-5
 """Poses that differ by less are the same, in leg lengths."""

@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from .body_dynamics import BodyDynamics
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _EVENNESS = 1e-6
 """How much an even split counts: decides only where force and moment leave the shares open."""

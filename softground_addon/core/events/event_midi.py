@@ -39,10 +39,6 @@ def dump(events: Sequence[Event]) -> bytes:
 
     A step is a note by surface and foot, as long as its contact, its velocity 127·clip(F/(3 BW), 0, 1)^0.7;
     controllers before it carry slide and depth. The other phases are text markers.
-
-    Parameters
-    ----------
-    events : sequence of Event
     """
     who = list(dict.fromkeys(row["character"] for row in events))
     channels = [channel for channel in range(16) if channel != PERCUSSION]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ COLUMNS = {
     "frame": "scene frame, with its fraction",
     "character": "who",
     "contact": "with what, such as foot.L",
-    "phase": "heel_strike, foot_flat, heel_off, toe_off, slide_start, slide_end, scuff or land",
+    "phase": "heel_strike, foot_flat, heel_off, toe_off, slide_start, slide_end, scuff, land or wade",
     "step": "id of the step in the report; empty of a scuff, and where nothing was pressed",
     "side": "L, R or empty",
     "position": "of the lowest point of the sole [m]",
@@ -44,6 +44,9 @@ COLUMNS = {
 LANDINGS = ("heel_strike", "land")
 """Phases with which a contact begins."""
 
+MOST_OF_A_CUT = 0.05, 0.95
+"""Parts of what a leg cuts between which it wades."""
+
 
 @sliced
 def events(
@@ -57,10 +60,8 @@ def events(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
     footprints : sequence of Footprint
         Of the same steps.
-    surface : str
     first_frame : float
         Of the bake.
 
@@ -80,15 +81,18 @@ def events(
     return _in_order(rows)
 
 
-def as_edited(table: Sequence[Event], steps: Sequence[EditableStep]) -> list[Event]:
+def as_edited(
+    table: Sequence[Event], steps: Sequence[EditableStep], carves: Mapping[int, Footprint] | None = None
+) -> list[Event]:
     """The events of the edited steps, with the mass that each phase threw: muted steps have none, moved steps have
-    theirs at the new place and time, and copies have their own.
+    theirs at the new place and time, and copies have their own. Deep steps wade besides.
 
     Parameters
     ----------
-    table : sequence of Event
     steps : sequence of EditableStep
         From the record.
+    carves : mapping of int to Footprint, optional
+        Its `laid_carves`.
     """
     of_steps: dict[str, list[Event]] = {step_id(step.baked): [] for step in steps}
     rows = [row for row in table if row["step"] not in of_steps]
@@ -96,6 +100,10 @@ def as_edited(table: Sequence[Event], steps: Sequence[EditableStep]) -> list[Eve
         if row["step"] in of_steps:
             of_steps[row["step"]].append(row)
     rows += [_moved(row, step) for step in steps if step.left for row in of_steps[step_id(step.baked)]]
+    if carves:
+        of_left = {row["step"]: row for row in reversed(rows)}
+        wading = ((of_left.get(step.name), step, carves.get(step.index)) for step in steps)
+        rows += [_wade(row, step, carve) for row, step, carve in wading if row and carve and carve.compressed_m3 > 0]
     return _in_order(rows)
 
 
@@ -206,6 +214,29 @@ def _moved(row: Event, step: EditableStep) -> Event:
         return row
     height = row["position"][2] + after.position[2] - before.position[2]
     return row | {"position": [_rounded(value, 5) for value in (*place, height)]}
+
+
+def _wade(row: Event, step: EditableStep, carve: Footprint) -> Event:
+    """What a leg cuts out of deep ground beside its print, by an event of the step."""
+    changes, cell = carve.compression, carve.cell_size
+    cut = np.maximum(np.add.reduceat(changes.amounts.astype(float), changes.first[:-1]), 0.0).cumsum()
+    start, end = changes.frames[np.searchsorted(cut, np.array(MOST_OF_A_CUT) * cut[-1])]
+    made_by = step.baked.pressed_by
+    spacing = made_by.time_step / step.baked.load_spacing if made_by else 0.0
+    depth = carve.tile(changes)
+    x, y = carve.window.centres(cell)
+    place = (depth.sum(axis=0) @ x / depth.sum(), depth.sum(axis=1) @ y / depth.sum(), row["position"][2])
+    unused = dict.fromkeys(("peak_force_n", "peak_bw", "impulse_ns", "landing_speed", "slide_speed", "thrown_kg"), 0.0)
+    return {
+        **(row | unused),
+        "time_s": _rounded(row["time_s"] + (start - row["frame"]) * spacing),
+        "frame": _rounded(start),
+        "phase": "wade",
+        "position": [_rounded(value, 5) for value in place],
+        "depth_m": _rounded(depth.max()),
+        "area_m2": _rounded(np.count_nonzero(depth) * cell**2),
+        "duration_s": _rounded((end - start) * spacing),
+    }
 
 
 def _rounded(value: float, digits: int = 6) -> float:

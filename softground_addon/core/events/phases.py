@@ -16,7 +16,7 @@ from ..numerics.intervals import runs
 
 Array = NDArray[np.float64]
 
-Kind = Literal["heel_strike", "foot_flat", "heel_off", "toe_off", "slide_start", "slide_end", "scuff", "land"]
+Kind = Literal["heel_strike", "foot_flat", "heel_off", "toe_off", "slide_start", "slide_end", "scuff", "land", "wade"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 FLAT = float(np.sin(np.radians(5.0)))

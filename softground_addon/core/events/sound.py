@@ -58,7 +58,6 @@ class SoundStep:
     ----------
     name : str
         Id of the step, which seeds all that is random in its sound.
-    surface : str
     struck : float or None
         Time of the strike [s]; None of one that was there already.
     lifted : float or None
@@ -91,7 +90,6 @@ def steps_of(
 
     Parameters
     ----------
-    footprints : mapping of step id to Footprint
     table : sequence of Event
         From `events.events`.
     frame_rate : float

@@ -7,11 +7,9 @@ import wave
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 RATE = 48_000
 """Samples per second [Hz]."""

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 _BODIES = {"L": "calcn_l", "R": "calcn_r"}
 """Bodies of OpenSim's models that a left and a right foot press on."""
@@ -68,7 +67,6 @@ def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
         Of the table, in its first line.
     time : (N,) float array
         [s]
-    feet : sequence of FootForce
     """
     labels, columns = ["time"], [time[:, None]]
     for foot in feet:

@@ -21,7 +21,6 @@ def write(path: Path, samples: Iterable[NDArray[np.float32]], *, start_frame: fl
 
     Parameters
     ----------
-    path : Path
     samples : iterable of (points, 3) float32 arrays
         Positions, frame by frame; they are written as they come.
     start_frame : float

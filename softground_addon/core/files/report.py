@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import Any
@@ -72,7 +72,7 @@ def build(
     carried_kg : mapping, optional
         Masses that soles carried onto hard floors, of a `core.carried.film.CarriedMass`.
     carves : mapping of int to Footprint, optional
-        Of the `BakeRecord`.
+        `laid_carves` of the `BakeRecord`.
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
@@ -100,9 +100,8 @@ def build(
     if carried_kg is not None:
         report["totals"]["carried_kg"] = dict(carried_kg)
     if carves:
-        lying = [carves[step.index] for step in steps if step.left and step.index in carves]
-        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in lying)
-        report["carved"] = _carved(lying)
+        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in carves.values())
+        report["carved"] = _carved(carves.values())
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:
@@ -115,7 +114,7 @@ def build(
     return report
 
 
-def _carved(carves: Sequence[Footprint]) -> dict[str, dict[str, float]]:
+def _carved(carves: Iterable[Footprint]) -> dict[str, dict[str, float]]:
     """Volumes that each character cut, packed into walls, left loose, and found no place for [m³]."""
     volumes: dict[str, dict[str, float]] = {}
     for carve in carves:

@@ -6,13 +6,11 @@ from copy import copy
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .sparse_grid import TILE, SparseGrid, Window
 
 Grid = TypeVar("Grid", bound=SparseGrid)
-
-Array = NDArray[np.float64]
 
 WIDE = TILE // 4
 """Cells on each side of a kernel beyond which it costs less to blur all in one direction, and that in the other."""
@@ -49,7 +47,6 @@ def blurred_window(field: SparseGrid, window: Window, sigma: float) -> Array:
     ----------
     field : SparseGrid
         Raw values; what lies around the window is blurred into it.
-    window : Window
     sigma : float
         Standard deviation [m].
 
@@ -76,7 +73,6 @@ def blurred(field: Grid, sigma: float) -> Grid:
 
     Parameters
     ----------
-    field : SparseGrid
     sigma : float
         Standard deviation [m].
     """

@@ -51,7 +51,6 @@ def snow(hardness: float, layer_depth: float | None = None) -> GroundMaterial:
 
     Parameters
     ----------
-    hardness : float
     layer_depth : float, optional
         Depth of the snow [m]; at least what the boot needs, if not given.
 
@@ -78,7 +77,7 @@ def with_boot_depth(material: GroundMaterial, depth: float) -> GroundMaterial:
 
 
 def boot_depth(material: GroundMaterial) -> float:
-    """How deep a standing boot sinks [m]."""
+    """Sinkage of a standing boot [m]."""
     load = BOOT_STRESS / (material.youngs_modulus * material.firmness(BOOT_WIDTH))
     return float(strain(load, material)) * material.layer_depth
 
@@ -141,7 +140,6 @@ def plates(kc: float, kphi: float, exponent: float, layer_depth: float = 0.3) ->
         [Pa m^(1 - exponent)], as [N/m^(exponent + 1)].
     kphi : float
         [N/m^(exponent + 2)].
-    exponent : float
     layer_depth : float
         Beyond which nothing sinks [m]; up to there, no depth depends on it.
 

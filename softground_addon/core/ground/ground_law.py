@@ -1,4 +1,4 @@
-"""How far a stress strains the loose layer, and what stress does (docs/model.md section 4).
+"""Strain of the loose layer by a stress, and the reverse (docs/model.md section 4).
 
 The paper's spring (Eq. 10) breaks off at the depth of the layer: strain = min(stress/E, 1). Measured ground follows a
 power of the strain (Bekker 1969), and packs to a density beyond which it gives way no further:

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..numerics import cell_keys
+from ..numerics.arrays import Array
 from .heightfield import Terrain
 from .terrain import SAME_LAYER, MeshTerrain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

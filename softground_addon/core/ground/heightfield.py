@@ -12,14 +12,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from .sparse_grid import SampledGrid, SparseGrid, Window
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
-
 
 STEEPEST_CELL = np.tan(np.radians(60.0))
 """Slope of the steepest cell that takes a print: more is a wall."""
@@ -91,7 +86,6 @@ class Surface:
 
     Attributes
     ----------
-    window : Window
     cell_size : float
         Side of a cell [m].
     heights : (rows, columns) float array
@@ -122,7 +116,7 @@ class Surface:
         return level, level + rise * self.cell_size
 
     def beyond(self, x: Array, y: Array) -> Mask:
-        """Which world positions [m] lie beyond the edge of the ground."""
+        """True for world positions [m] beyond the edge of the ground."""
         off: Mask = np.isnan(self.heights[self.window.cells_under(x, y, self.cell_size)])
         return off
 
@@ -145,7 +139,6 @@ class TerrainTiles:
 
     Parameters
     ----------
-    terrain : Terrain
     cell_size : float
         Side of a cell [m].
     """

@@ -104,7 +104,7 @@ class GroundMaterial:
         return replace(self, youngs_modulus=self.youngs_modulus * weight) if self.cohesionless else self
 
 
-OFF = {one.name: float(one.default) for one in fields(GroundMaterial) if one.metadata}  # type: ignore[arg-type]
+OFF = {each.name: float(each.default) for each in fields(GroundMaterial) if each.metadata}  # type: ignore[arg-type]
 """What the fields are that a bake of earlier versions, or one in which they are off, does not say."""
 Pressure = Literal["UNIFORM", "CENTRE_OF_PRESSURE"]
 """Evenly, as in the paper; or more where the force acts, so that it acts there."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from .sparse_grid import Window
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class Places:
@@ -49,6 +47,6 @@ class Places:
 
 
 def inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
-    """Which places lie in the cells of a window."""
+    """True for places in the cells of a window."""
     column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
     return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)

@@ -45,7 +45,6 @@ class Preset:
         Where its numbers come from.
     surface : str
         See `surfaces`.
-    material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE', optional
     tread : float, optional
         Depth of the bars of shoes [m].

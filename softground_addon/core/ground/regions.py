@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .material import GroundMaterial
 from .sparse_grid import Window
 from .terrain import MeshTerrain
-
-Array = NDArray[np.float64]
 
 MOST = 16
 """Kinds of ground that one ground may have."""
@@ -30,7 +29,6 @@ class GroundKind:
     ----------
     surface : str
         See `surfaces`.
-    material : GroundMaterial
     """
 
     surface: str
@@ -70,27 +68,27 @@ class Regions:
             numbers = self.where.interpolated(*np.meshgrid(*around.centres(cell_size)))[-1]
             kinds = np.unique(numbers[around.slices(inner)])
             kinds = kinds[~np.isnan(kinds)]  # beside the ground
-        found = kinds.astype(int).tolist() or [0]
-        if len(found) == 1:
-            return found, None
+        present = kinds.astype(int).tolist() or [0]
+        if len(present) == 1:
+            return present, None
         shares = _sum_around(numbers == kinds[:, None, None])
         total = shares.sum(axis=0)
-        return found, np.divide(shares, total, out=np.full(shares.shape, 1.0 / len(found)), where=total > 0)
+        return present, np.divide(shares, total, out=np.full(shares.shape, 1.0 / len(present)), where=total > 0)
 
 
 def numbered(
-    own: GroundKind, of_slots: Mapping[int, GroundKind | None]
+    ground_kind: GroundKind, of_slots: Mapping[int, GroundKind | None]
 ) -> tuple[tuple[GroundKind, ...], dict[int, float]]:
     """Each kind of ground once, and its number for each slot that names one; `HARD` of those that are hard.
 
     Parameters
     ----------
-    own : GroundKind
+    ground_kind : GroundKind
         What the ground is made of where no slot says otherwise: the first kind.
     of_slots : mapping of int to GroundKind or None
         None of what is hard.
     """
-    kinds = list(dict.fromkeys([own, *(kind for kind in of_slots.values() if kind)]))
+    kinds = list(dict.fromkeys([ground_kind, *(kind for kind in of_slots.values() if kind)]))
     return tuple(kinds), {slot: float(kinds.index(kind)) if kind else HARD for slot, kind in of_slots.items()}
 
 

@@ -46,14 +46,12 @@ class Weathering(Protocol):
         ----------
         ground : HeightField
             As it was left by steps.
-        window : Window
         since : (rows, columns) float array
             Frame at which each cell changed last.
         trodden : SparseGrid
             1 in cells that were ever in contact, else 0.
         pressed : (rows, columns) float array
             How far steps compressed each cell, all together [m].
-        frame : float
         section : float or None
             Volume of a print over its width [m²], None where it is not known yet.
 
@@ -72,7 +70,6 @@ class SoftGround:
     ----------
     terrain : Terrain
         The undisturbed ground.
-    material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
         How the force on a sole spreads over its contact.
     variation : Variation or None

@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..numerics import bilinear
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
+from ..numerics.arrays import Array, Indices, Mask
 
 TILE = 32
 """Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""

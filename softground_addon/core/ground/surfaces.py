@@ -185,7 +185,6 @@ class SurfaceRecord:
         As presets and records name it.
     density : float
         Of the loose matter [kg/m³]; sand is quartz of 2,650 with 40 % of pores.
-    thrown, fragments, voice : ThrownMatter, Fragments, Voice
     colour : (float, float, float)
         Of its pieces, and of the ground in Solid shading.
     shades, swell : (float, float), float

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..numerics.triangles import barycentric, enumerated
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 UPWARD = 0.05
 """Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""

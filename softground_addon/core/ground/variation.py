@@ -1,4 +1,4 @@
-"""How the ground varies from place to place: factors on stiffness, layer depth and rim, as painted on its surface."""
+"""Variation of the ground from place to place: factors on stiffness, layer depth and rim, as painted on its surface."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .sparse_grid import SampledGrid, Window
 from .terrain import MeshTerrain
-
-Array = NDArray[np.float64]
 
 CHANNELS = ("stiffness", "depth", "rim")
 """What may vary, in the order of `Variation.factors`."""
@@ -66,7 +64,6 @@ class VariationTiles:
 
     Parameters
     ----------
-    variation : Variation
     cell_size : float
         Side of a cell [m].
     """

@@ -15,12 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.ground_law import load_at
 from ..ground.material import FIRM_RATIO, GroundMaterial
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 CLOSE = 1e-9
 """Relative error of the load that a body is borne with on ground whose springs are not linear."""
@@ -56,8 +54,6 @@ class Springs:
 
         Parameters
         ----------
-        force : float
-        material : GroundMaterial
         firmness : float
             See `GroundMaterial.firmness`.
         near : float

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from ..ground.heightfield import Surface
 from ..ground.variation import Factors
 from ..motion.props import Prop, posed
+from ..numerics.arrays import Array
 from ..soles.undersides import lowest_surface
 from .indentation import Springs
-
-Array = NDArray[np.float64]
 
 SAMPLES_ACROSS = 48
 """Samples along the side of a square as large as what may touch: areas are then known to about 1 %."""
@@ -61,7 +60,6 @@ def ground_under(
 
     Parameters
     ----------
-    prop : Prop
     pose : (4, 4) float array
     cells : Surface
         Of all cells that the body is over, at least.

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ..ground.heightfield import Surface
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array
 from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
 from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps, touching_fraction
 
-Array = NDArray[np.float64]
 PatchOverCells = tuple[NDArray[np.intp], Single, Single]
 """See `patches_over_cells`."""
 
@@ -31,7 +31,6 @@ def cell_coverage(
 
     Parameters
     ----------
-    patches : iterable of PatchOverCells
     fine : Window
         Cells that are `divisions` times smaller than those looked for.
     sinkage : (N,) float array
@@ -63,10 +62,8 @@ def patches_over_cells(
 
     Parameters
     ----------
-    sole : Sole
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
-    ground : Surface
     lowest : (N,) float array
         Height of the sole's lowest point above the undisturbed ground [m].
     tolerance : float

@@ -10,17 +10,14 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.04
 """What counts as touching, in sole lengths: 1 cm for an adult, the give of a shoe and the error of a pose."""
@@ -61,7 +58,6 @@ class SolePoints:
 
     Attributes
     ----------
-    patches : tuple of PatchPoints
     length : float
         Longest extent of the sole's outline [m], the scale of `TOLERANCE` and `FINEST_DETAIL`.
     """
@@ -116,7 +112,6 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
 
     Parameters
     ----------
-    sole : Sole
     transforms : (F, P, 4, 4) float array
         Its motion, to know how its patches lie to each other when the sole is flat.
     """
@@ -166,7 +161,6 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
 
     Parameters
     ----------
-    points : SolePoints
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
     ground : Surface
@@ -253,7 +247,6 @@ def centroid(points: SolePoints, transforms: Array, pressing: Array) -> Array:
 
     Parameters
     ----------
-    points : SolePoints
     transforms : (N, P, 4, 4) float array
     pressing : (N, Q) or (1, Q) float array
         Area in contact of each point [m²].

@@ -17,7 +17,7 @@ from ..motion.sole_motion import SoleMotion
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
 from .foot_placement import PressedGround, between_contacts
-from .sole_rim import posed_rim, rim_pieces
+from .sole_rim import along, posed_rim, rim_pieces
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -32,7 +32,10 @@ MOST = 0.8
 AXLE = 0.01
 """Points that bear within about this distance of each other are an axle, about which the foot may turn, in lengths."""
 TWIST = np.radians(25.0)
-"""A foot that turns by more than this in one contact keeps its turn, about its bearing points [rad]."""
+"""A foot that turns by more than this in one contact keeps its turn, about those of its bearing points that are nearest
+to its front, or to its rear end if that is the calmer one [rad]."""
+PIVOT = 0.05
+"""Distance from there at which a point counts 1/e as much, in sole lengths."""
 TRAVEL = 0.15
 """A foot that goes so far along the floor in a burst is meant to go there, in leg lengths (14 cm for an adult)."""
 FARTHEST = 0.5
@@ -59,12 +62,15 @@ class Underside:
         Which rigid piece of the sole each belongs to.
     length : float
         Of the sole [m].
+    along : (Q,) float array
+        Place of each along the sole, from 0 at its rear end to 1 at its front.
     """
 
     points: Array
     heights: Array
     piece: NDArray[np.intp]
     length: float
+    along: Array
 
     def lowest(self) -> Array:
         """Height of the lowest point, (F,) [m]."""
@@ -98,7 +104,7 @@ def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Und
     known = np.isfinite(ground)
     above_lowest = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
     heights = np.where(known.any(axis=1, keepdims=True), np.where(known, points[..., 2] - ground, np.inf), above_lowest)
-    return Underside(points, heights, rim_pieces(motion.sole), motion.sole.length)
+    return Underside(points, heights, rim_pieces(motion.sole), motion.sole.length, along(motion.sole))
 
 
 def lock(sole: Underside, touching: Mask, weight: Array | None = None) -> Array:
@@ -106,18 +112,16 @@ def lock(sole: Underside, touching: Mask, weight: Array | None = None) -> Array:
 
     Parameters
     ----------
-    sole : Underside
     touching : (F,) bool array
     weight : (F, Q) float array, optional
         Weight with which each point stays in place, by default that of its bearing; 1 in all of a frame.
     """
-    points, length = sole.points, sole.length
     weight = sole.bearing() if weight is None else weight
-    turn, move = np.zeros(len(points)), np.zeros((len(points), 2))
-    middle = points[..., :2].mean(axis=1)
+    turn, move = np.zeros(len(touching)), np.zeros((len(touching), 2))
+    middle = sole.points[..., :2].mean(axis=1)
     for first, end in zip(*runs(touching), strict=True):
         during = slice(first, end)
-        turn[during], shift = _held(points[during, :, :2], weight[during], length)
+        turn[during], shift = _held(sole, during, weight[during])
         move[during] = turned_level(turn[during], middle[during]) + shift - middle[during]
     return eased(middle, turn, move, touching)
 
@@ -144,14 +148,17 @@ def eased(middle: Array, turn: Array, move: Array, touching: Mask) -> Array:
     return displacement(rotation(turn[:, None] * (0.0, 0.0, 1.0)), start, end)
 
 
-def _steps(points: Array, weight: Array, length: float) -> tuple[Array, Array, bool]:
+def _steps(sole: Underside, during: slice, weight: Array) -> tuple[Array, Array, bool]:
     """Turns (K - 1,) and shifts (K - 1, 2) that bring each frame's bearing points back to where they were in the frame
     before, and True if the foot turns on purpose."""
-    both = _bearing_in_both(weight)
-    turns, shifts = _fitted(points[1:], points[:-1], both, AXLE * length)
-    if abs(turns.sum()) > TWIST:
-        return (*_fitted(points[1:], points[:-1], both, np.inf), True)
-    return turns, shifts, False
+    points, both = sole.points[during, :, :2], _bearing_in_both(weight)
+    turns, shifts = _fitted(points[1:], points[:-1], both, AXLE * sole.length)
+    if abs(turns.sum()) <= TWIST:
+        return turns, shifts, False
+    ends = points[:, [sole.along.argmin(), sole.along.argmax()]]
+    rear, front = np.abs(turns) @ np.linalg.norm(np.diff(ends, axis=0), axis=-1)
+    beside = sole.along if rear < front else 1.0 - sole.along
+    return (*_fitted(points[1:], points[:-1], both * np.exp(-beside / PIVOT), np.inf), True)
 
 
 def rolled(points: Array, weight: Array) -> Array:
@@ -165,9 +172,10 @@ def _bearing_in_both(weight: Array) -> Array:
     return np.where(both.sum(axis=1, keepdims=True) > 1e-3, both, weight[1:] + weight[:-1])
 
 
-def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:
+def _held(sole: Underside, during: slice, weight: Array) -> tuple[Array, Array]:
     """Turn (K,) and shift (K, 2) of one contact's frames: x goes to R(turn)·x + shift, and bearing points stay."""
-    turns, shifts, on_purpose = _steps(points, weight, length)
+    points, length = sole.points[during, :, :2], sole.length
+    turns, shifts, on_purpose = _steps(sole, during, weight)
     turn = np.concatenate([[0.0], np.cumsum(turns)])
     shift = np.concatenate([np.zeros((1, 2)), np.cumsum(turned_level(turn[:-1], shifts), axis=0)])
     if not on_purpose:
@@ -175,7 +183,8 @@ def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:
     slid = np.linalg.norm(np.gradient(shift, axis=0), axis=1) if len(shift) > 1 else np.zeros(1)
     slow = (1.0 / (1.0 + (slid / (STILL * length)) ** 2))[:, None] * weight
     held = turned_level(turn[:, None], points) + shift[:, None]
-    back, away = _fitted(held.reshape(1, -1, 2), points.reshape(1, -1, 2), slow.reshape(1, -1), AXLE * length)
+    axle = np.inf if on_purpose else AXLE * length
+    back, away = _fitted(held.reshape(1, -1, 2), points.reshape(1, -1, 2), slow.reshape(1, -1), axle)
     return turn + back, turned_level(back, shift) + away
 
 
@@ -223,7 +232,6 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
 
     Parameters
     ----------
-    sole : Underside
     touching : (F,) bool array
     motion : CharacterMotion
         Whose sole it is, at the same frames.
@@ -256,7 +264,7 @@ def slides(sole: Underside, touching: Mask) -> Array:
     distances = [np.zeros(0)]
     for first, end in zip(*runs(touching), strict=True):
         points = sole.points[first:end, :, :2]
-        _, shifts, on_purpose = _steps(points, weight[first:end], sole.length)
+        _, shifts, on_purpose = _steps(sole, slice(first, end), weight[first:end])
         if on_purpose:
             distances.append(np.linalg.norm(np.cumsum(shifts, axis=0), axis=1))
         else:

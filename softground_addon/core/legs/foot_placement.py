@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
 from .wading import depth_of_contacts, dragged, ploughed
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ANKLE_PITCH = np.radians(25.0)
 """Largest pitch that a foot takes on beside that of the source [rad]: feet bend up by 20-30° (dorsiflexion)."""
@@ -314,7 +311,7 @@ def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
 
 
 def _swing_lowered(spare: Array, touching: Mask, time: float) -> Array:
-    """How far a foot that ploughs swings lower (F,) [m]: by what is to spare, 0 at contacts."""
+    """Amount by which a foot that ploughs swings lower (F,) [m]: what is to spare, 0 at contacts."""
     distance = _frames_from_contact(touching) - 0.5  # between the frames
     return np.where(np.isfinite(spare), np.maximum(spare, 0.0), 0.0) * smooth_step(distance / time)
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.orientation import rotation_vectors
 from ..numerics.plane_fit import smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation, unit
@@ -19,9 +19,6 @@ from .foot_placement import Placement
 from .hips import HIPS_TIME, hips_follow, hips_go_along, wading_depth
 from .knee_pace import PacedLeg, follow, relieve
 from .legs import Leg, solve
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""

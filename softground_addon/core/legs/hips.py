@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.plane_fit import smoothed
 from .foot_placement import Placement
 from .wading import DEPTH_TIME, body_depth, depth_of_contacts
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LOWER_FOOT = 0.02
 """Least height by which one foot stands lower for the hips to follow it, in leg lengths."""
@@ -34,7 +31,6 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
 
     Parameters
     ----------
-    motion : CharacterMotion
     placements : mapping of int to Placement
         By sole.
     touching : (F, S) bool array
@@ -67,8 +63,6 @@ def hips_go_along(
 
     Parameters
     ----------
-    motion : CharacterMotion
-    soles : sequence of int
     offsets : sequence of (F, D) float arrays
         Movement of the foot on each [m].
     touching : (F, S) bool array

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.banded import solve_banded
 from ..numerics.slices import Slices, sliced
 from .legs import Leg
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _FRAME = 1 / 30
 """The time that the pace of a knee refers to [s]."""
@@ -67,7 +65,6 @@ class PacedLeg:
 
     Attributes
     ----------
-    source : Leg
     hip, ankle : (F, 3) float arrays
         Where they would go [m].
     reach : (F,) float array
@@ -116,7 +113,6 @@ class _Hips:
         Order of the derivative of their movement that is to be small.
     smoothing : float
         Cost of this derivative, beside `magnitude`, that of the deviation: see `SMOOTHING_TIME`.
-    magnitude : float
     """
 
     axes: Array

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.plane_fit import smoothed
 from ..numerics.rigid import displacement, perpendicular, rotation, turn_between, unit
-
-Array = NDArray[np.float64]
 
 _KNEE_HINT = 0.1
 """Weight of the direction of the foot for that of the knee, in leg lengths of knee offset: a bent knee keeps its own, a

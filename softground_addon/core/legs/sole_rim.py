@@ -63,6 +63,12 @@ def rim_pieces(sole: Sole) -> NDArray[np.intp]:
     return np.asarray(_shares(sole, rim(sole)).argmax(axis=0))
 
 
+def along(sole: Sole) -> Array:
+    """Place of each point of the rim along the sole, (Q,), from 0 at its rear end to 1 at its front."""
+    x = np.concatenate([places[:, 0] for _, places in rim(sole)])
+    return np.asarray((x - x.min()) / max(float(np.ptp(x)), 1e-9))
+
+
 def _shares(sole: Sole, pieces: Pieces) -> Array:
     """Share of each piece's motion in that of each point of the rim, (P, Q), 1 in all."""
     if len(sole.patches) < 2 or not sole.bend:

@@ -6,15 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import smoothed
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DEPTH_TIME = 0.4
 """Standard deviation of the smoothing of the sinkage that the body responds to [s], for an adult."""

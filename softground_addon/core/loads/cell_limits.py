@@ -1,7 +1,8 @@
-"""Whether a shot can be baked: in memory, in the time that is allowed, with cells that show a foot."""
+"""Limits of what can be baked: in memory, in the time that is allowed, with cells that show a foot."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -12,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.display_spacing import spacing_of
+from ..numerics.arrays import Array
 from .estimate import CharacterLoads
 from .tracks import tracks
-
-Array = NDArray[np.float64]
 
 BYTES_PER_VERTEX = 900.0
 """What a vertex of the display mesh that moves takes [bytes], on figures of 2 cm to 7 m with cells of 0.4 to 20 mm."""
@@ -55,6 +54,9 @@ BYTES_PER_FRAME = 60e3
 FRAMES_PER_SECOND = 100.0
 """Frames of a character that are baked in a second, about."""
 
+CLOSE_UP_SPACING = 0.0025
+"""Distance of the vertices of a trail that is seen from close by [m], about: grooves of a tread are 4 mm wide."""
+
 CELLS_ALONG_SOLE = 10
 """Cells along a sole that show its outline."""
 
@@ -64,7 +66,7 @@ USABLE = 0.8
 
 @dataclass(frozen=True)
 class Fineness:
-    """How finely a ground is pressed and shown.
+    """Fineness with which a ground is pressed and shown.
 
     Attributes
     ----------
@@ -85,6 +87,13 @@ class Fineness:
     relief: str = "OFF"
     most_vertices: int = 0
     is_carved: bool = False
+
+    @property
+    def spacing(self) -> float:
+        """Distance of the vertices along a trail [m]: that of the cells, in a close-up halved some times."""
+        close_up = self.relief == "CLOSE_UP"
+        halvings = max(0, round(math.log2(self.cell_size / CLOSE_UP_SPACING))) if close_up else 0
+        return self.cell_size / 2.0**halvings
 
 
 @dataclass(frozen=True)
@@ -115,7 +124,7 @@ class Coverage:
 
     def vertices(self, fine: Fineness) -> float:
         """Vertices that show them, however many there may be."""
-        return self.cells(spacing_of(fine.cell_size, fine.relief), fine.rim_reach)
+        return self.cells(fine.spacing, fine.rim_reach)
 
     def laid_out(self, cell_size: float, rim_reach: float) -> Array:
         """Cells of the window of each print, (K,)."""
@@ -130,8 +139,7 @@ class Coverage:
         at_once = np.minimum(laid_out * np.minimum(self.steps, STEPS_AT_ONCE), CELLS_AT_ONCE).max(initial=0.0)
         memory = max(at_once * BYTES_PER_CELL_LAID_OUT, vertices * BYTES_PER_VERTEX)
         simulating = laid_out @ self.steps * SECONDS_PER_CELL_LAID_OUT + cells * SECONDS_PER_CELL
-        spacing = spacing_of(fine.cell_size, fine.relief)
-        writing = vertices * (SECONDS_PER_VERTEX + SECONDS_OF_FINE_VERTICES / spacing**2)
+        writing = vertices * (SECONDS_PER_VERTEX + SECONDS_OF_FINE_VERTICES / fine.spacing**2)
         return BYTES_AT_LEAST + float(memory), SECONDS_AT_LEAST + float(simulating + writing)
 
 
@@ -169,8 +177,6 @@ def check_cell_size(
 
     Parameters
     ----------
-    loads : sequence of CharacterLoads
-    fine : Fineness
     longest : float
         What the bake may take [s].
     available : float, optional
@@ -220,8 +226,6 @@ def check_frames(
 
     Parameters
     ----------
-    first, last : int
-    characters : int
     longest : float
         What the bake may take [s].
     available : float, optional
@@ -241,7 +245,7 @@ def check_frames(
 
 
 def _too_much(needed: float, time: float, longest: float, available: float | None, set_by: str = "") -> str:
-    """Which limit memory [bytes] or time [s] are beyond; empty where neither is."""
+    """Limit that memory [bytes] or time [s] are beyond; empty where neither is."""
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:

@@ -1,13 +1,11 @@
-"""How far points are from the ground, along its normal."""
+"""Distances of points from the ground, along its normal."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 STEEPEST_GROUND = np.cos(np.radians(60.0))
 """Vertical part of the normal of the steepest ground that bears a sole: more is a wall."""
@@ -33,7 +31,6 @@ def clearances(points: Array, terrain: Terrain, *, reach: float) -> tuple[Array,
     ----------
     points : (N, L, 3) float array
         World positions of the landmarks [m].
-    terrain : Terrain
     reach : float
         Half the distance over which the ground's slope is read [m].
 

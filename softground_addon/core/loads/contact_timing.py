@@ -17,12 +17,11 @@ from ..dynamics.body_dynamics import FREE_FALL, BodyDynamics, flights
 from ..dynamics.centre_of_pressure import extents, lowest_points
 from ..dynamics.load_sharing import whole_body_shares
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import close_short, runs
 from ..numerics.smoothing_spline import smooth_path
 from .contacts import EDGE_CUTOFF, LEAVE_HEIGHT, TOUCH_SPEED, Contacts
 from .sliding import treadmill_velocity
-
-Array = NDArray[np.float64]
 
 SEARCH = 0.33
 """How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""
@@ -138,7 +137,7 @@ def _rolled_on(touching: NDArray[np.bool_], lifted: NDArray[np.bool_], longest: 
 
 
 def _resting(motion: CharacterMotion) -> NDArray[np.bool_]:
-    """When the skin of each sole rests, (N, S); never where that is not seen."""
+    """True while the skin of each sole rests, (N, S); never where that is not seen."""
     never = np.zeros(len(motion.frames), dtype=bool)
     return np.stack([never if sole.bears is None else sole.bears for sole in motion.soles], axis=1)
 
@@ -273,7 +272,7 @@ class _Windows:
 
     Attributes
     ----------
-    found : (T, 2) int array
+    estimated : (T, 2) int array
         Strike and leave as they were found.
     feet : (T, 2) int array
         The trailing and the leading sole.
@@ -283,7 +282,7 @@ class _Windows:
         Where each window ends: its steps from there on say nothing.
     """
 
-    found: NDArray[np.intp]
+    estimated: NDArray[np.intp]
     feet: NDArray[np.intp]
     step: NDArray[np.intp]
     end: NDArray[np.intp]
@@ -326,8 +325,8 @@ def _shares_told(
     trailing, leading = windows.feet[:, :1], windows.feet[:, 1:]
     inside = step < end
     sure = round(SURE * TIMING_DEVIATION * unit)
-    before = step < windows.found.min(axis=1, keepdims=True) - sure
-    after = (step >= windows.found.max(axis=1, keepdims=True) + sure) & inside
+    before = step < windows.estimated.min(axis=1, keepdims=True) - sure
+    after = (step >= windows.estimated.max(axis=1, keepdims=True) + sure) & inside
     within = np.minimum(step, end - 1)
     back, front = lowest[within, trailing], lowest[within, leading]
     ground = np.select([before, after], [back[..., 2], front[..., 2]], (back[..., 2] + front[..., 2]) / 2)
@@ -350,7 +349,7 @@ def _shares_told(
 
 def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) -> NDArray[np.intp]:
     """The pairs of strike and leave near those found whose ramps fit the shares (T, W) best, (T, 2)."""
-    first, step, end = windows.found, windows.step, windows.end[:, None]
+    first, step, end = windows.estimated, windows.step, windows.end[:, None]
     search = max(round(SEARCH * unit), 1)
     best = first
     for stride in (COARSE_STRIDE, 1):

@@ -1,4 +1,4 @@
-"""When each sole touches its ground.
+"""Contacts of each sole with its ground.
 
 Detection is scale-free: heights are compared as fractions of the leg length and speeds as fractions of
 sqrt(gravity·leg length), so that the same numbers serve a mouse and a giant, metres and centimetres
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..ground.hard_ground import up_to
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.slices import Slices, sliced
@@ -26,9 +27,6 @@ from .clearances import clearances
 
 if TYPE_CHECKING:
     from ..ground.heightfield import Terrain
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOUCH_HEIGHT = 0.025
 """A sole lower than this starts to touch, in leg lengths (2 cm for an adult)."""
@@ -83,7 +81,7 @@ SLOPE_PROBE = 0.02
 
 @dataclass(frozen=True)
 class Contacts:
-    """Which soles touch at each step.
+    """Soles that touch at each step.
 
     Attributes
     ----------
@@ -109,7 +107,7 @@ class Contacts:
 
     @property
     def standing(self) -> Mask:
-        """Which soles touch the ground or something hard, (N, S)."""
+        """True for soles that touch the ground or something hard, (N, S)."""
         return self.touching if self.hard is None else self.touching | self.hard
 
     def during(self, steps: slice) -> Contacts:
@@ -183,9 +181,9 @@ def _shown(touching: Mask, seen: Contacts) -> Mask:
     shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
     for sole in np.flatnonzero(seen.touching.any(axis=0)):
         for first, last in zip(*runs(seen.touching[:, sole]), strict=True):
-            told = np.flatnonzero(shown[first:last, sole])
-            if len(told):  # it does not leave and land again while its skin bears on
-                shown[first + told[0] : first + told[-1], sole] = True
+            seen_at = np.flatnonzero(shown[first:last, sole])
+            if len(seen_at):  # it does not leave and land again while its skin bears on
+                shown[first + seen_at[0] : first + seen_at[-1], sole] = True
             if shown[first:last, sole].mean() < SURE:
                 shown[first:last, sole] = True
         bears, clearance = seen.touching[:, sole], seen.clearance[:, sole]
@@ -283,7 +281,6 @@ def slowest_belt(velocities: Sequence[Array], motion: CharacterMotion) -> float:
     ----------
     velocities : sequence of (N, 2 or 3) float array
         Of each sole [m/s].
-    motion : CharacterMotion
     """
     fastest = max(float(np.percentile(np.linalg.norm(velocity[:, :2], axis=1), 95)) for velocity in velocities)
     unit = motion.froude_speed
@@ -299,7 +296,7 @@ def _low(clearance: Array, leg_length: float) -> float:
 def _detect(
     track: _Track, drift: Array, body_speed: Array, motion: CharacterMotion, float_limit: float
 ) -> tuple[Mask, float]:
-    """When one sole touches, and the float that was removed."""
+    """Steps at which a sole touches, and the float that was removed."""
     leg = motion.leg_length
     speed = np.linalg.norm(track.velocity - drift, axis=-1)
     offset = _float(track.clearance, speed / motion.froude_speed, float_limit * leg)

@@ -1,4 +1,4 @@
-"""How far estimated forces may be off: a standard deviation for each sole at each step.
+"""Error of estimated forces: a standard deviation for each sole at each step.
 
 Four causes decide it, each tried or worked out by itself and added in squares: the choice of the low-pass, the times at
 which contacts begin and end, the noise of the motion, and the share of soles that bear together.
@@ -9,17 +9,15 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.body_dynamics import BodyDynamics, body_dynamics
 from ..dynamics.load_sharing import POINT_DEVIATION
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.smoothing_spline import smooth_path
 from .contacts import Contacts
 from .estimate import CharacterLoads
 from .forces import whole_body_forces
-
-Array = NDArray[np.float64]
 
 CUTOFF_FACTOR = 1.25
 """Between cut-offs that are as good a choice: their factor about the one that is taken, standard deviation."""

@@ -32,6 +32,11 @@ class CharacterLoads:
     forces: ContactForces
 
 
+def follows_landings(motion: CharacterMotion, force_model: ForceModel) -> bool:
+    """True if the forces of a motion are those of its landings, which last as long as the ground needs to give way."""
+    return motion.centre is not None or force_model == "IMPULSE" or not motion.joints
+
+
 @sliced
 def estimate_loads(
     motion: CharacterMotion,
@@ -74,7 +79,7 @@ def estimate_loads(
     ground = beyond_edge(source, terrain)
     contacts = yield from detect_contacts.slices(source, ground)
     yield
-    if force_model == "IMPULSE" or not motion.joints:  # without joints, nothing tells what the body does
+    if follows_landings(motion, force_model):  # without joints, nothing tells what the body does
         forces = impulse_forces(source, contacts, material.characteristic_time)
     else:
         body = body_dynamics(source, ~contacts.touching.any(axis=1))

@@ -17,10 +17,9 @@ from ..dynamics.centre_of_mass import centre_of_mass
 from ..dynamics.centre_of_pressure import centres_of_pressure, lowest_points
 from ..dynamics.load_sharing import point_of_action, share_by_moment, whole_body_shares
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from .contacts import Contacts
-
-Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -143,7 +142,7 @@ def _with_idle(share: Array, touching: NDArray[np.bool_]) -> Array:
 
 
 def _along_legs(motion: CharacterMotion, centre: Array, share: Array, pressure: Array) -> Array:
-    """How much more each force leans than their sum does, (N, S, 2): legs push along themselves.
+    """Lean of each force beyond that of their sum, (N, S, 2): legs push along themselves.
 
     Feet that bear together push against each other so that their forces meet above the body's centre (Maus et al. 2010,
     "Upright human gait did not provide a major mechanical challenge for our ancestors", Nature Communications 1,

@@ -1,4 +1,4 @@
-"""When a prop without a skeleton touches the ground and what the ground does to it, from its mass and its motion.
+"""Contacts of a prop without a skeleton and what the ground does to it, from its mass and its motion.
 
 A body in the air feels nothing. On the ground it feels its weight, and what changes its momentum: m·(g + a). What stops
 a fall stops it within the ground's characteristic time, as in the paper (Eq. 8): animation and simulation stop it from
@@ -12,21 +12,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.load_sharing import share_by_moment
 from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
 from ..motion.props import posed
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import linear
 from ..numerics.intervals import hysteresis, runs
 from .clearances import ground_normal
 from .contacts import Contacts
 from .forces import UP, ContactForces
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOUCH_HEIGHT = 0.02
 """A body lower than this above its ground touches it, in its sizes."""
@@ -143,7 +140,6 @@ def _pushed(
         Of the centre from each frame to the next [m/s].
     seen : Contacts
         At the frames.
-    motion : CharacterMotion
     steps, shortest, lasting : int
         Steps in a frame, of the shortest contact, and over which a change of velocity acts.
     landing_only : bool
@@ -162,7 +158,7 @@ def _pushed(
 
 @dataclass(frozen=True)
 class _Approach:
-    """How a prop lies to its ground at each of F frames.
+    """Place of a prop over its ground at each of F frames.
 
     Attributes
     ----------

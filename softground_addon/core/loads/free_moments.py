@@ -9,15 +9,13 @@ less the moment of the forces leaves the twist.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.body_dynamics import body_dynamics
 from ..dynamics.centre_of_mass import trunk_spin
 from ..dynamics.continuation import continued
+from ..numerics.arrays import Array
 from ..numerics.smoothing_spline import smooth_path
 from .estimate import CharacterLoads
-
-Array = NDArray[np.float64]
 
 GRIP = 0.05
 """Largest free moment of a sole that presses with a force of 1, in leg lengths (32 N·m on an adult's foot that bears

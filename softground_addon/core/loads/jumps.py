@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion
 from .contacts import Contacts
 from .forces import UP, ContactForces
-
-Array = NDArray[np.float64]
 
 FEWEST = 3
 """What is seen for fewer samples between two jumps bears nothing."""
@@ -32,7 +29,6 @@ def joined(
     parts : sequence of (samples, contacts, forces)
         Those that were looked at. Nothing bears in others, nor from the last sample before a jump to the first after
         it, but for soles that stay.
-    steps : int
     """
     count, soles = (len(motion.frames) - 1) * steps + 1, len(motion.soles)
     contacts = Contacts(

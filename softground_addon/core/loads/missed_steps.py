@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from ..findings import Finding
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Mask
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
 from .sliding import treadmill_velocity
-
-Mask = NDArray[np.bool_]
 
 REST_TIME = 0.5
 """A sole that stands rests for longer than this, in sqrt(leg length/gravity) (0.15 s for an adult): one at the top of a
@@ -28,7 +27,6 @@ class MissedStep:
 
     Attributes
     ----------
-    sole : str
     frame : float
         Scene frame at which it comes to rest.
     clearance : float
@@ -46,7 +44,6 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
 
     Parameters
     ----------
-    motion : CharacterMotion
     contacts : Contacts
         At the motion's samples.
 
@@ -74,7 +71,7 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
 
 
 def rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) -> Mask:
-    """When some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
+    """True while some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
     points = sole.landmark_positions()
     if len(points) < 2:
         return np.zeros(len(points), dtype=bool)

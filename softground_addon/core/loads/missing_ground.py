@@ -12,13 +12,11 @@ from ..ground.hard_ground import HardOnSoft, bare
 from ..ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import runs
 from .contacts import TOUCH_HEIGHT, Contacts
 from .forces import ContactForces
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MOST_PLACES = 300
 """Places along the way from which the edge of the ground is looked for."""
@@ -37,7 +35,6 @@ class LevelBeyondEdge:
 
     Parameters
     ----------
-    terrain : Terrain
     places : (K, 2) float array
         World positions that have ground [m].
     """

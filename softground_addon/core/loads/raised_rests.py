@@ -6,16 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.hard_ground import HardOnSoft, Reach
 from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from .contacts import LEAVE_HEIGHT, SHORTEST_CONTACT, TOUCH_HEIGHT
 from .missed_steps import rests
-
-Array = NDArray[np.float64]
 
 STEP_UP = 0.4
 """Soles stand on a surface that is up to this far above them, in leg lengths: below the knee."""
@@ -27,7 +25,6 @@ class RaisedRest:
 
     Attributes
     ----------
-    character, sole : str
     frame : float
         Of the scene, at which the rest begins.
     place : (3,) float array

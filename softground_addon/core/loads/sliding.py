@@ -14,7 +14,6 @@ def treadmill_velocity(motion: CharacterMotion, contacts: Contacts) -> NDArray[n
 
     Parameters
     ----------
-    motion : CharacterMotion
     contacts : Contacts
         At the motion's samples.
 

@@ -26,7 +26,6 @@ def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
 
     Parameters
     ----------
-    character : CharacterLoads
     index : int
         Of the sole.
     """

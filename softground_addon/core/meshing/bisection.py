@@ -17,15 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.slices import Slices
 from .equal_parts import equal_parts
 from .region import Region
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Numbers = NDArray[np.int32]
 """Numbers of vertices, edges and triangles, as wide as in meshes: there are many while they are cut."""
-Mask = NDArray[np.bool_]
 
 AT_ONCE = 1 << 16
 """Triangles that are looked at together."""

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from ..numerics.arrays import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,6 @@ def equal_parts(points: Array, corner: Indices, edge: Indices, ends: Indices, co
         Its edges; the first lies opposite the first corner.
     ends : (E, 2) int array
         Points of each edge.
-    count : int
     grain : float
         1 / 2^n, of the length of an edge.
 

@@ -14,12 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Indices
 from ..numerics.cell_keys import AROUND, Keys, among, cells_of, keys_of, merged, parents_of
 from ..numerics.slices import Slices, sliced
-
-Indices = NDArray[np.intp]
 
 _CORNERS = keys_of(np.array([(0, 0), (1, 0), (1, 1), (0, 1)]))
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.cell_keys import Keys, among, cells_of, keys_of, parents_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 class Region:

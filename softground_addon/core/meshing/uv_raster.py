@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.triangles import barycentric, enumerated
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 PAIRS_AT_ONCE = 4_000_000
 """Pairs of a triangle and a pixel that are tested together: about 300 MB."""

@@ -15,12 +15,11 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import cubic, linear
 from .people import has_two_legs
 from .sole_motion import SoleMotion, _between, shortest_length
 from .units import scale_to_metres
-
-Array = NDArray[np.float64]
 
 SIMULATION_RATE = 120.0
 """Lowest rate of the internal time grid, in Hz: at 24, 30, 60 and 120 fps the steps fall on the same instants."""
@@ -98,7 +97,6 @@ class CharacterMotion:
         Scene frame numbers, evenly spaced.
     frame_rate : float
         Scene frames per second [Hz].
-    soles : tuple of SoleMotion
     joints : dict of str to (F, 3) float array
         World positions of those of `JOINTS` that are mapped, and of `CENTRE` [m].
     gravity : float
@@ -187,7 +185,7 @@ class CharacterMotion:
 
     @property
     def time_scale(self) -> float:
-        """How much slower than an adult's a motion of the same kind is."""
+        """Ratio of its times to those of an adult's motion of the same kind."""
         return float(np.sqrt(self.leg_length / ADULT_LEG))
 
     @property

@@ -28,7 +28,6 @@ def likely_mass(by_volume: float, size: float, *, two_legs: bool) -> tuple[float
         Of its skin [kg], 0 where unknown: figures with large heads and clothes of air weigh far less.
     size : float
         Largest extent of its joints [m], 0 where unknown.
-    two_legs : bool
 
     Examples
     --------

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from ..numerics.arrays import Array, Indices
 
 FEW_VERTICES = 400
 """Meshes with fewer vertices are probed between them too: the faces of a box are larger than bumps of the ground."""

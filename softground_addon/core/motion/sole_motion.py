@@ -11,10 +11,9 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import Between, cubic, in_stretches, turning
 from .props import Prop
-
-Array = NDArray[np.float64]
 
 COARSER = 4.0
 """How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
@@ -125,7 +124,6 @@ class SoleMotion:
 
     Attributes
     ----------
-    sole : Sole
     transforms : (F, P, 4, 4) float array
         Patch frame to world, rotation and translation only [m]; of the one frame of a prop.
     bears : (F,) bool array or None

@@ -8,9 +8,8 @@ section 4.5): a dozen rounds of array operations instead of one for each row. Th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .arrays import Array
 
 
 def solve_banded(band: Array, right: Array) -> Array:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Indices = NDArray[np.intp]
+from .arrays import Indices
 
 
 def components(count: int, node: Indices, other: Indices) -> Indices:

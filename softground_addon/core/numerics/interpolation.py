@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from .arrays import Array
 from .orientation import quaternions
 from .rigid import rotation
 from .slices import Slices, sliced
-
-Array = NDArray[np.float64]
 
 STRETCH = 512
 """Samples computed at once: few enough that the intermediate arrays of a formula take little memory."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
+from .arrays import Mask
 
 
 def hysteresis(start: Mask, stop: Mask) -> Mask:

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from .arrays import Array, Indices
 
 
 def kept_samples(values: Array, tolerance: float) -> Indices:

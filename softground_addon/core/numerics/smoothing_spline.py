@@ -7,12 +7,9 @@ ends of the path, takes samples at any subset of the steps, and known accelerati
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, Mask
 from .banded import solve_banded
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _ORDER = 3
 """The penalty is on the third derivative, so the bandwidth of the normal equations is 3."""

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from .arrays import Array, Indices
 
 SLACK = 1e-9
 """Points on a shared edge lie in both triangles: without it rounding could let them fall between."""

@@ -144,8 +144,6 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
 
     Parameters
     ----------
-    by : Pass
-    plant : Plant
     frame : float
         Scene frame.
     frame_rate : float
@@ -159,8 +157,8 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
     broken = 1.0 - np.exp((0.0 - plant.breaks) * by.lasting)
     stays = np.maximum(broken, np.greater(chance, cover(by.passes, plant.half_after))) * MOST_LASTING
     released = np.maximum(1.0 - plant.stiffness, stays)
-    left = np.exp((0.0 - np.maximum(since, 0.0)) / (plant.recovery * frame_rate))
-    kept = 1.0 - np.greater(by.above, 0.0) * (1.0 - BRUSHED)
-    rising = (stays + (released - stays) * left) * np.greater(since, 0.0) * kept
-    weight = np.maximum(holds, np.greater(frame, by.start) * kept)
+    remaining = np.exp((0.0 - np.maximum(since, 0.0)) / (plant.recovery * frame_rate))
+    lasting = 1.0 - np.greater(by.above, 0.0) * (1.0 - BRUSHED)
+    rising = (stays + (released - stays) * remaining) * np.greater(since, 0.0) * lasting
+    weight = np.maximum(holds, np.greater(frame, by.start) * lasting)
     return np.maximum(holds, rising) * by.reach, weight * by.reach

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from ..record.footprints import Footprint
 from .bending import Pass, lasting_of
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 BESIDE = 0.05
@@ -130,9 +130,9 @@ def _movement(step: Footprint, place: Array, start: Array, end: Array) -> _Movem
     came = before + np.clip(np.searchsorted(frames, start), 0, last - before)
     point = np.column_stack([place, np.full(len(place), step.position[2])])
     patch = _patch_over(step, poses, came, point)
-    there, earlier = poses[came, patch], np.maximum(came - MOVEMENT_STEPS, 0)
+    arrived, earlier = poses[came, patch], np.maximum(came - MOVEMENT_STEPS, 0)
     local = np.ones((len(place), 4))  # of what touches there, in its patch
-    local[:, :3] = np.einsum("nji,nj->ni", there[:, :3, :3], point - there[:, :3, 3])
+    local[:, :3] = np.einsum("nji,nj->ni", arrived[:, :3, :3], point - arrived[:, :3, 3])
     way = point - np.einsum("nij,nj->ni", poses[earlier, patch], local)[:, :3]
     along = way[:, :2] + ALONG_HEADING * heading
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
@@ -141,10 +141,10 @@ def _movement(step: Footprint, place: Array, start: Array, end: Array) -> _Movem
     for number in range(poses.shape[1]):
         height[:, patch == number] = poses[:, number, 2] @ local[patch == number].T
     is_low = height <= height[before:].min(axis=0) + LIFTED
-    left = last - is_low[::-1].argmax(axis=0)
-    later, at = np.minimum(left + MOVEMENT_STEPS, last), np.minimum(left, np.maximum(last - 1, 0))
+    leaves = last - is_low[::-1].argmax(axis=0)
+    later, at = np.minimum(leaves + MOVEMENT_STEPS, last), np.minimum(leaves, np.maximum(last - 1, 0))
     rise = (height[later, each] - height[at, each]) / np.maximum(later - at, 1)
-    stays = np.maximum(end, frames[np.maximum(left - before, 0)])
+    stays = np.maximum(end, frames[np.maximum(leaves - before, 0)])
     return _Movement(along, down / step.load_spacing, np.maximum(rise, slowest) / step.load_spacing, stays)
 
 

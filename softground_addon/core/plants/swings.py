@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from ..record.footprints import Footprint
 from .sole_passes import BESIDE_BEND, COLUMNS, FRAME_RATE
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SWING_HEIGHT = 0.04

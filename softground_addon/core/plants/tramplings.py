@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from .bending import Pass
 from .sole_passes import COLUMNS, OF_PASS, passes_of
 from .swings import swings
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CELL = 0.025
@@ -76,12 +76,7 @@ class Tramplings:
 
 @sliced
 def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
-    """Passes of the soles that left footprints; None without any.
-
-    Parameters
-    ----------
-    footprints : iterable of Footprint
-    """
+    """Passes of the soles that left footprints; None without any."""
     steps = sorted((step for step in footprints if len(step.contact_cells)), key=lambda step: step.start_frame)
     if not steps:
         return None
@@ -99,8 +94,8 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
     origin, tile, tiles, slot = _tiled(cells)
     order = np.lexsort((table["start"], slot))
     slot, table = slot[order], {name: values[order] for name, values in table.items()}
-    kept, table = _in_turn(slot, table)
-    slot = slot[kept]
+    chosen, table = _in_turn(slot, table)
+    slot = slot[chosen]
     first = np.concatenate([[0], np.cumsum(np.bincount(slot, minlength=int(tiles.max()) + tile**2))])
     is_next = np.concatenate([[False], slot[1:] == slot[:-1]])
     active = table["start"] - TALLEST / table["down"]
@@ -151,11 +146,11 @@ def _in_turn(slot: Indices, table: dict[str, Array]) -> tuple[Indices, dict[str,
         return np.asarray(sums - (sums[begins] - values[begins])[of_slot])
 
     trodden = summed(table["passes"])
-    kept = np.flatnonzero((table["passes"] > 0) | (trodden == 0))
-    last = np.append(kept[1:], len(slot)) - 1
-    result = {name: values[kept] for name, values in table.items()}
+    taken = np.flatnonzero((table["passes"] > 0) | (trodden == 0))
+    last = np.append(taken[1:], len(slot)) - 1
+    result = {name: values[taken] for name, values in table.items()}
     for name in ("lasting", "passes"):
-        result[name] = summed(table[name])[kept]
+        result[name] = summed(table[name])[taken]
     for name in ("sink", "slope_x", "slope_y"):
         result[name] = summed(table[name])[last]
-    return kept, result
+    return taken, result

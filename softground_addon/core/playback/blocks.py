@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from ..numerics.packed import PackedArray
 from ..record.footprints import QUANTUM, Footprint
-
-Array = NDArray[np.float64]
 
 BLOCK = 64
 """Cells along the sides of a block: most footprints fit into one."""
@@ -22,7 +20,6 @@ class ChangesInBlocks:
 
     Parameters
     ----------
-    footprint : Footprint
     is_small : bool
         As of `PackedArray`.
     """

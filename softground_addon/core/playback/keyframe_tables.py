@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from .ramps import QUANTUM, Ramps
 from .vertex_histories import VertexHistories
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 NO_CONTACT = 1e9
 """Frame of contacts that never come."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.sparse_grid import SparseGrid
+from ..numerics.arrays import Array, Indices
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
@@ -25,8 +26,6 @@ from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
 from .vertex_histories import VertexHistories, vertex_histories
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Integers = NDArray[np.int32]
 Floats = NDArray[np.float32]
 

@@ -13,12 +13,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.key_reduction import bend_lines
 
 Intervals = TypeVar("Intervals", bound=Any)
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 TOLERANCE = 2e-4
 """Largest error of a fitted height while it moves [m]; at rest there is none."""
@@ -82,7 +80,6 @@ class Fit:
 
     Attributes
     ----------
-    ramps : Ramps
     error : (K, C) float array
         Largest difference of each value at each point, over time.
     """

@@ -28,8 +28,8 @@ Indices = NDArray[np.intp]
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
 
-ROOM = 50_000
-"""Cells of the footprints near places up to which their changes are not packed: some megabytes."""
+ROOM = 500_000
+"""Changes of the footprints near places up to which they are not packed: six megabytes."""
 
 _NO_RAMPS = Ramps.joined([], 2)
 
@@ -66,7 +66,6 @@ class VertexHistories:
     movement : Ramps
         Change of the displayed height, and displayed compression, this to `SHADING_TOLERANCE` [m]; the rim is the sum
         of both.
-    contacts : PointContacts
     error : float
         Largest error of a displayed height, at any place and frame [m].
     """
@@ -100,7 +99,6 @@ def vertex_histories(
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     x, y : (K,) float arrays
         World positions [m].
     blur_sigma : float
@@ -119,7 +117,8 @@ def vertex_histories(
     near = _near(footprints, places, kernels)
     for number in in_blocks.keys() - set(near):
         del in_blocks[number]
-    is_small = sum(footprints[number].window.cells for number in near) < ROOM
+    of_near = [changes for number in near for changes in (footprints[number].compression, footprints[number].rim)]
+    is_small = sum(int(changes.first[-1]) for changes in of_near) < ROOM
     for number in near:
         in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_small=is_small))
     footprints = [footprints[number] for number in near]
@@ -141,9 +140,16 @@ def vertex_histories(
             shared = np.zeros(len(points))
             for other in together:
                 shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
-            fitted = fit(frames, moved, allowed / shared[:, None])
+            margin, off = allowed / shared[:, None], np.zeros(len(points))
+            if is_carved[number]:  # half of the tolerance for its ends
+                margin = margin / 2
+                shortened = _without_small_ends(moved, margin)
+                off = np.abs(shortened - moved)[..., 0].max(axis=0)
+                fitted = fit(frames, shortened, margin)
+            else:
+                fitted = fit(frames, moved, margin)
             of_step.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
-            error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
+            error = max(error, float(((fitted.error[:, 0] + off) * shared).max(initial=0.0)))
             yield
         if len(its_relief.point):
             span = spans[number, 0], spans[number, 1]
@@ -156,6 +162,15 @@ def vertex_histories(
         joined(contacts),
         error,
     )
+
+
+def _without_small_ends(moved: Array, margin: Array) -> Array:
+    """Movements (T, K, C) that begin and end where they are off their first and last values by more than a margin."""
+    begun = np.logical_or.accumulate((np.abs(moved) > margin).any(axis=-1), axis=0)
+    ends = np.logical_or.accumulate((np.abs(moved - moved[-1]) > margin).any(axis=-1)[::-1], axis=0)[::-1]
+    shortened: Array = np.where(ends[..., None], np.where(begun[..., None], moved, 0.0), moved[-1])
+    shortened[0] = 0.0
+    return shortened
 
 
 def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[float, Array]) -> list[int]:

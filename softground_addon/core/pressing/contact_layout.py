@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from ..record.contact_steps import Steps
 from .ground_cells import GroundCells, Imprints, Timing
 from .kind_shares import across
 from .rim import in_contact, lean_of_landing, leaning, rim_weights, whole_reach
-
-Array = NDArray[np.float64]
 
 STEPS_AT_ONCE = 128
 """Steps of one contact that are laid out in one go: about one contact of a walk."""
@@ -33,8 +31,6 @@ class ContactLayout(ABC):
 
     Parameters
     ----------
-    character : str
-    sole : Sole
     steps : Steps
         All of the contact.
     strength : float
@@ -68,9 +64,6 @@ class ContactLayout(ABC):
 
         Parameters
         ----------
-        start, end : int
-        cells : GroundCells
-        timing : Timing
         sinkage : float
             How far the ground has given way under the sole's lowest point by then [m].
         """

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from ..ground.ground_law import loose_strain, packed, strain
 from ..ground.material import GroundMaterial
 from ..imprints.sole_points import touching_fraction
+from ..numerics.arrays import Array, Mask
 from .plate import Plate
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Fraction = NDArray[np.floating[Any]]
 
 
@@ -58,7 +57,6 @@ def target_compression(
     ----------
     stress : float array of any shape
         Normal stress [Pa]; over cells where the pressure varies under the sole.
-    material : GroundMaterial
     firmness : float
         See `GroundMaterial.firmness`.
     stiffness, depth : float or float array
@@ -83,7 +81,6 @@ def compression_rate(
     ----------
     step : float or float array
         Duration of the step [s].
-    material : GroundMaterial
     target : float or float array
         Compression that the stress leads to [m].
     landing_speed : float or float array
@@ -129,7 +126,6 @@ def sink(
         See `sole_points.touching_fraction` [m].
     step : float
         Time step [s].
-    material : GroundMaterial
     sinkage : float
         That reached before the first step [m].
     landing_speed : float

@@ -14,8 +14,7 @@ from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, VariationTiles
-
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,6 @@ class UndisturbedCells:
 
     Parameters
     ----------
-    ground : SoftGround
     cell_size : float
         Side of a cell [m].
     """
@@ -69,7 +67,6 @@ class GroundCells:
 
     Parameters
     ----------
-    ground : SoftGround
     undisturbed : UndisturbedCells
         Its cells as they are before anything presses them.
 
@@ -77,7 +74,6 @@ class GroundCells:
     ----------
     cell_size : float
         Side of a cell [m].
-    undisturbed : UndisturbedCells
     surface, factors
         See `UndisturbedCells`.
     material : GroundMaterial
@@ -141,7 +137,6 @@ class Imprints:
         Step of the simulation.
     parts : int
         Number of parts that each step is laid out in: more than one where the sole moves far in a step.
-    window : Window
     coverage : (N, rows, columns) float array
         Fraction of each cell that is in contact.
     contact : (N, rows, columns) bool array
@@ -160,7 +155,6 @@ class Imprints:
         How the ground varies over the window.
     reached : float
         How far the ground has given way under the sole's lowest point after the last step [m].
-    loads : Loads
     material : GroundMaterial
         That bears.
     made_of : str

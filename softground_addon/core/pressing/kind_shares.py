@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.variation import Factors
+from ..numerics.arrays import Array
 from .ground_cells import Imprints
-
-Array = NDArray[np.float64]
 
 INCOMPRESSIBLE = 0.5
 """Poisson's ratio of ground all of which rises that is compressed; in each cell a factor takes off what does not."""
@@ -32,7 +31,7 @@ def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
 
 
 def across(of_kinds: Sequence[Imprints], shares: Array) -> tuple[Imprints, int]:
-    """Which cells are compressed how much where each kind of ground has a share in them.
+    """Compression of cells where each kind of ground has a share in them.
 
     Parameters
     ----------

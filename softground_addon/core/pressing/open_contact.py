@@ -18,7 +18,6 @@ class OpenContact:
 
     Parameters
     ----------
-    layout : ContactLayout
     earlier : OpenContact, optional
         The contact that this one goes on from without leaving the ground, where a long track is cut into several.
     pressed_by : ContactSteps, optional

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..imprints.sole_points import SolePoints
+from ..numerics.arrays import Array
 
-Array = NDArray[np.float64]
 Pressure = NDArray[np.floating[Any]]
 
 FALL_TIME = 0.06
@@ -62,7 +62,6 @@ def plate_of(points: SolePoints, target: Array, rate: Any, softness: float) -> P
 
     Parameters
     ----------
-    points : SolePoints
     target : (N,) float array
         Compression that the load at each step, spread over the whole sole, leads to [m].
     rate : float or (N,) float array

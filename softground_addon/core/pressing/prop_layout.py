@@ -7,7 +7,6 @@ from functools import cached_property
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
 from ..ground.material import GroundMaterial
@@ -17,14 +16,13 @@ from ..imprints.indentation import stress
 from ..imprints.prop_imprint import ground_under
 from ..motion.props import Prop
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from ..numerics.interpolation import turning
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import compression_rate
 from .ground_cells import GroundCells, Imprints, Loads
 from .rim import in_contact, rim_weights, whole_reach
-
-Array = NDArray[np.float64]
 
 STRIDE = 1 / 32
 """A body that moves further than this in a step is laid out in parts of the step, in its sizes."""
@@ -45,7 +43,6 @@ class PropLayout(ContactLayout):
 
     Parameters
     ----------
-    character : str
     sole : Sole
         With a prop.
     steps : Steps

@@ -11,10 +11,9 @@ from __future__ import annotations
 from math import ceil, hypot, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..numerics.arrays import Array, Mask
+
 Cells = tuple[slice, slice]
 
 STEPS_PER_SLIDE, SWEEPS_PER_SLIDE = 4, 4

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.material import GroundMaterial
+from ..numerics.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Fraction = NDArray[np.floating[Any]]
 
 LEANING_DISTANCE = 0.1

@@ -36,8 +36,6 @@ class SoleLayout(ContactLayout):
 
     Parameters
     ----------
-    character : str
-    sole : Sole
     steps : Steps
         All of the contact.
     points : SolePoints
@@ -47,12 +45,15 @@ class SoleLayout(ContactLayout):
     def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints, *, strength: float = 1.0) -> None:
         self.points = points
         self._width = points.width
-        self._remembered = cache(self._posed)
+        self._remembered, self._under = cache(self._posed), cache(self._cells_under)
         super().__init__(character, sole, steps, strength=strength)
 
     def _window(self, start: int, end: int, cells: GroundCells) -> Window:
-        window = contact_window(self.points, self.steps.poses[start - self.first : end - self.first], cells.cell_size)
-        return window.expanded(whole_reach(cells.rim_reach))
+        return self._under(start, end, cells.cell_size).expanded(whole_reach(cells.rim_reach))
+
+    def _cells_under(self, start: int, end: int, cell_size: float) -> Window:
+        """The cells that it may touch in these steps."""
+        return contact_window(self.points, self.steps.poses[start - self.first : end - self.first], cell_size)
 
     def _lay_out(
         self, start: int, end: int, window: Window, cells: GroundCells, step: float, sinkage: float
@@ -95,7 +96,9 @@ class SoleLayout(ContactLayout):
         )
         contact = in_contact(coverage)
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
-        rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
+        rim = np.zeros(coverage.shape)
+        if material.poisson_ratio:
+            rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed, plate)
         stress = self._stress(steps, window, cells, sinking, area * fraction, plate)
         if factors and stress.ndim == 1:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array, Mask
 from ..record.footprints import FootprintRecorder, quantised
 from .deformation import compress
 from .ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
@@ -18,9 +19,6 @@ from .open_contact import OpenContact
 from .repose import STEPS_PER_SLIDE, SWEEPS_PER_SLIDE, SWEEPS_TO_REST, slid, slide_reach
 from .rim import displaced_volume
 from .weathered_cells import WeatheredCells
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ROOM = 16
 """Cells around those that slide whose undisturbed surface is looked up along with theirs: more slide later."""
@@ -31,7 +29,6 @@ class GroundSolver:
 
     Parameters
     ----------
-    ground : SoftGround
     state : HeightField
         What was pressed of it so far; it is worked on.
     undisturbed : UndisturbedCells
@@ -62,10 +59,8 @@ class GroundSolver:
         ----------
         contacts : list of OpenContact
             Those that are open by its end; at last without those that have ended.
-        start, end : int
         frame : float
             Scene frame.
-        timing : Timing
         is_last : bool
             All contacts end.
 

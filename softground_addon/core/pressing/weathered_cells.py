@@ -9,15 +9,12 @@ from __future__ import annotations
 from math import fsum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import Weathering
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array, Mask
 from .ground_cells import Imprints
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 class WeatheredCells:
@@ -25,7 +22,6 @@ class WeatheredCells:
 
     Parameters
     ----------
-    weathering : Weathering
     cell_size : float
         Side of a cell [m].
     """
@@ -67,7 +63,6 @@ class WeatheredCells:
 
         Parameters
         ----------
-        ground : HeightField
         imprints : Imprints
             Where it will press and raise the ground.
         level : float

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ..motion.props import Prop
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array
 from .contact_steps import LENGTH, ContactSteps, PressingSole, coded, decoded, patch_of, width_of
-
-Array = NDArray[np.float64]
 
 _OF_STEPS = 9
 """Numbers of each footprint: sole, first step, approach, step's duration, origin (3), peak, values coded."""

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ..motion.props import Prop
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array
 from ..numerics.orientation import quaternions, rotation_matrices
 from ..numerics.packed import Packed
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int32]
 
 LENGTH = 2.0**-20
@@ -69,7 +69,6 @@ class PressingSole:
 
     Attributes
     ----------
-    sole : Sole
     flat : (P, 4, 4) float array
         Poses of its patches.
     """

@@ -89,12 +89,10 @@ def with_edit(
 
     Parameters
     ----------
-    edits : mapping of step id to StepEdit
     footprint : Footprint
         The step as it was baked.
     name : str
         Its id, or that of the copy: edits stored under ids of an earlier bake go.
-    edit : StepEdit or None
     """
     _, _, copy = _parts(name)
     others = {other: stored for other, stored in edits.items() if not _is_of(_parts(other), footprint, copy)}
@@ -146,7 +144,6 @@ def sole_of(edit: StepEdit, baked: PressingSole, known: Mapping[str, PressingSol
 
     Parameters
     ----------
-    edit : StepEdit
     baked : PressingSole
         That made the step: a foot may be swapped, a prop may not.
     known : mapping of str to PressingSole

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array
 from ..numerics.packed import Packed
 from .contact_steps import ContactSteps
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 QUANTUM = 2.0**-30
@@ -208,7 +208,6 @@ class FootprintRecorder:
         ----------
         frame : float
             Scene frame, not before that of the last call.
-        window : Window
         change : (2, rows, columns) int array
             Change of compression and rim [QUANTUM]; the rim of ground that slides down falls.
         touched : (rows, columns) bool array
@@ -317,7 +316,6 @@ def last_contact(footprints: Iterable[Footprint], frame: float, cell_size: float
 
     Parameters
     ----------
-    footprints : iterable of Footprint
     frame : float
         Scene frame.
     cell_size : float

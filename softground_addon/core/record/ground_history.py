@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..ground.sparse_grid import Window
+from ..numerics.arrays import Array
 from .footprints import QUANTUM, Changes, Footprint
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

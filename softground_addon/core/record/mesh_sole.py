@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..motion.motion import Array
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from .contact_arrays import sole_from_arrays, sole_to_arrays
 from .contact_steps import PressingSole, kept_sole
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from ..ground.display_blur import blurred, gaussian_kernel
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, side_by_side
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
-
-Array = NDArray[np.float64]
 
 PART = 1 << 15
 """Places for which the ground is made together."""

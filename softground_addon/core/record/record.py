@@ -23,6 +23,7 @@ from . import edits as step_edits
 from . import throws as step_throws
 from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
+from .moved_carve import moved_carve, placement
 
 FORMAT = 1
 """Version of the bytes' layout. A new one needs a migration from the one before in `MIGRATIONS`."""
@@ -75,6 +76,8 @@ class BakeRecord:
         `edited` and `steps`, not from those of `footprints` and `pressed_again`.
     carves : mapping of int to Footprint
         What bodies carved beside their prints in deep ground, by the numbers of the steps that it goes with.
+    carved_with : mapping of step id to StepEdit
+        Where the artist had put steps, and how large, when they were carved.
     """
 
     footprints: Sequence[Footprint]
@@ -84,12 +87,31 @@ class BakeRecord:
     throws: Sequence[step_throws.Throw] = ()
     thrown: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     carves: Mapping[int, Footprint] = field(default_factory=dict)
+    carved_with: Mapping[str, step_edits.StepEdit] = field(default_factory=dict)
+    _laid: dict[int, tuple[Any, Footprint]] = field(default_factory=dict, repr=False, compare=False)
+    """Carves that were moved, each with what it follows from; shared by records that differ by edits."""
 
     @property
     def shaping(self) -> list[Footprint]:
         """All that the ground is made from: the edited footprints, and after them the carves of steps that are left."""
-        carved = [step.index for step in self.steps if step.left and step.index in self.carves]
-        return [*self.edited, *(self.carves[number] for number in carved)]
+        return [*self.edited, *self.laid_carves.values()]
+
+    @cached_property
+    def laid_carves(self) -> dict[int, Footprint]:
+        """The carves of steps that are left, by their numbers, where these are now; a copy takes that of its step."""
+        before = step_edits.edits_by_number(self.footprints, self.carved_with)
+        laid: dict[int, Footprint] = {}
+        for step in self.steps:
+            number = step.index % len(self.footprints)
+            if step.left is None or (carve := self.carves.get(number)) is None:
+                continue
+            was, now = placement(before.get(number, step_edits.UNCHANGED)), placement(step.edit)
+            known = self._laid.get(step.index)
+            if known is None or known[0][0] is not carve or known[0][1:] != (was, now):
+                known = (carve, was, now), moved_carve(carve, step.baked.position, was, now)
+                self._laid[step.index] = known
+            laid[step.index] = known[1]
+        return laid
 
     @property
     def edited(self) -> list[Footprint]:
@@ -123,8 +145,6 @@ class EditableStep:
         As it was baked; of a copy, its original.
     left : Footprint or None
         As it lies on the ground, without the thrown volume; None if nothing of it does.
-    edit : StepEdit
-    is_copy : bool
     thrown : mapping of str to float
         Thrown volumes by phase [m³].
     """
@@ -173,6 +193,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         "throws": [step_throws.to_json(throw) for throw in record.throws],
         "thrown": [[number, dict(volumes)] for number, volumes in sorted(record.thrown.items())],
         **({"carves": [number for number, _ in carves]} if carves else {}),
+        **({"carved_with": step_edits.to_json(record.carved_with)} if record.carved_with else {}),
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -218,11 +239,12 @@ def load(content: bytes) -> BakeRecord:
     except _DAMAGE as error:
         raise _damaged(error) from None
     changes = step_edits.from_json(edits, _EDITS)
+    carved_with = step_edits.from_json(text["carved_with"], _EDITS) if "carved_with" in text else {}
     footprints = from_arrays(names, soles, arrays)
     prints = iter(footprints[baked:])
     pressed_again = {number: next(prints) if has_print else None for number, has_print in again}
     carves = dict(zip(carved, prints, strict=True))
-    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves)
+    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves, carved_with)
 
 
 def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.StepEdit]]:

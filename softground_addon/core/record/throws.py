@@ -14,13 +14,12 @@ from enum import IntEnum
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.packed import Packed
 from .edits import StepEdit
 from .footprints import Footprint
 
-Array = NDArray[np.float64]
 _Part = TypeVar("_Part")
 
 WEIGHT, AIM, FOLLOWED = 0, slice(1, 4), 4
@@ -50,7 +49,6 @@ class Throw:
         Of the footprint as it was baked.
     phase : str
         See `core.events.phases`.
-    kind : ThrowKind
     is_foot : bool
         True if it has a heel and a ball to roll over.
     first, spacing : float
@@ -87,7 +85,6 @@ class Throw:
         ----------
         baked, edited : Footprint
             The step as it was baked and as it was edited.
-        edit : StepEdit
         """
         shift = round(edit.shift_frames / baked.frame_step) * baked.frame_step
         turn, moved = edited.heading - baked.heading, edited.position - baked.position
@@ -123,7 +120,6 @@ def from_json(contents: Sequence[Mapping[str, Any]], count: int, largest: int) -
 
     Parameters
     ----------
-    contents : sequence of mapping
     count : int
         Of footprints that were baked.
     largest : int

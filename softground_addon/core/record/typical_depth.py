@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .footprints import Footprint
-
-Array = NDArray[np.float64]
 
 BORNE = 0.9
 """Share of the whole load that the main contacts bear."""

@@ -56,7 +56,7 @@ class Tread:
     """Height of a tread's ridges [mm], and the parts of it that are lost in the best and worst places."""
 
     height: float
-    kept: float = 0.0
+    least_lost: float = 0.0
     lost: float = 0.7
 
 
@@ -80,15 +80,10 @@ class Amounts:
         Of the outline and all that lies along it.
     bends_with_depth : bool
         True if walls are bent at each depth otherwise.
-    chunks : Chunks or None
     ledges : tuple of Bend
         Offsets of the wall, out or back, at each of its heights.
     wall : float
         Width of the wall seen from above; 0 keeps the walls that the simulation has.
-    tread : Tread or None
-    water : Water or None
-    layers : tuple of Layer
-    crumbs : Crumbs or None
     surface : str
         That the crumbs are of, see `core.ground.surfaces`.
     """

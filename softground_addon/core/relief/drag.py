@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import smooth_step
 from ..record.footprints import Footprint
 from .lattice_noise import noise
 from .layers import Around
-
-Array = NDArray[np.float64]
 
 LEAST, WHOLE = 0.01, 0.04
 """Ways that leave a first mark, and a whole one [m]: a planted sole gives way by some millimetres as it rolls."""
@@ -97,7 +95,6 @@ def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
 
     Parameters
     ----------
-    footprint : Footprint
     length, depth : float
         Of the print [m].
     """

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
+
 Whole = NDArray[np.int64] | NDArray[np.uint32]
 Lattice = NDArray[np.uint32]
 
@@ -57,7 +58,6 @@ def noise(seed: int, size: float, *place: Array) -> Array:
 
     Parameters
     ----------
-    seed : int
     size : float
         From one value of the lattice to the next [m].
     *place : (N,) float arrays
@@ -145,8 +145,8 @@ def cells(seed: int, size: float, x: Array, y: Array) -> Cells:
     dx = u - column - i - (value & np.uint32(0xFFFF)) * 2.0**-16
     dy = v - row - j - (value >> np.uint32(16)) * 2.0**-16
     distance = dx * dx + dy * dy
-    own = np.argmin(distance, axis=0), np.arange(len(u))
-    nearest = distance[own]
-    distance[own] = np.inf
+    closest = np.argmin(distance, axis=0), np.arange(len(u))
+    nearest = distance[closest]
+    distance[closest] = np.inf
     to_edge = np.sqrt(distance.min(axis=0)) - np.sqrt(nearest)
-    return Cells(value[own], to_edge * size, dx[own] * size, dy[own] * size)
+    return Cells(value[closest], to_edge * size, dx[closest] * size, dy[closest] * size)

@@ -8,12 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import smooth_step
 from .lattice_noise import Cells, cells, fractal, noise, uniform
-
-Array = NDArray[np.float64]
 
 MM = 1e-3
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import smooth_step
 from ..record.footprints import Footprint
 from .amounts import Amounts, Chunks
@@ -17,8 +17,6 @@ from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
 from .scattered_crumbs import ScatteredCrumbs, scattered
 from .tread import GROOVE, LENGTH, SoleTread, Under
-
-Array = NDArray[np.float64]
 
 SHALLOW = 0.5
 """Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""
@@ -64,8 +62,6 @@ class PrintRelief:
 
     Parameters
     ----------
-    shape : PrintShape
-    amounts : Amounts
     seed : int
         The print's own.
     finest : float
@@ -259,10 +255,10 @@ class PrintRelief:
         for drag in self._drags:
             ridges = ridges * drag.spared(around)
         if self._tread.is_flesh:
-            height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.kept)
+            height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.least_lost)
             return ridges * around.pressed * height * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
-        lost = tread.kept + (tread.lost - tread.kept) * worn * worn
+        lost = tread.least_lost + (tread.lost - tread.least_lost) * worn * worn
         within = smooth_step((around.inward - around.length(3.0)) / around.length(6.0))
         return ridges * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
 

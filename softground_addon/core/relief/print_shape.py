@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.sparse_grid import Window
 from ..numerics import bilinear
+from ..numerics.arrays import Array, Indices, Mask
 from ..record.footprints import Footprint
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 REACH = 0.06
 """Distance from its outline up to which a print has relief [m]."""
@@ -50,7 +46,6 @@ class PrintShape:
 
     Attributes
     ----------
-    window : Window
     cell_size : float
         Side of a cell [m].
     fields : (8, rows, columns) float array

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground import crumbs, surfaces
+from ..numerics.arrays import Array
 from .lattice_noise import hashed, uniform
 from .layers import Around
-
-Array = NDArray[np.float64]
 
 SUNK = 0.7
 """Largest depth of a crumb's middle below the ground, over its radius."""
@@ -88,7 +87,6 @@ def scattered(
 
     Parameters
     ----------
-    surface : str
     seed : int
         The print's own.
     low, high : (2,) float arrays

@@ -7,19 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.display_blur import gaussian_kernel
 from ..ground.places import Places
+from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
 from .print_relief import relief_of_print
 from .tread import SoleTread
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 QUANTUM = 2.0**-20
 """Step of heights [m], as of those that are played (`playback.ramps.QUANTUM`)."""
@@ -90,7 +87,6 @@ def relief_of_steps(
         In the order of their first contact.
     x, y : (K,) float arrays
         World positions [m].
-    wanted : ReliefSettings
     blur_sigma : float
         Standard deviation of the display blur [m].
     """

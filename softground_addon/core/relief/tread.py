@@ -9,12 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.interpolation import smooth_step
 from .tread_map import height_at
-
-Array = NDArray[np.float64]
 
 LENGTH = 0.27
 """Length of the sole that the patterns are drawn for [m]."""
@@ -121,7 +119,6 @@ class SoleTread:
 
     Attributes
     ----------
-    pattern : Pattern
     is_mirrored : bool
         True for left feet.
     """

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics import bilinear
+from ..numerics.arrays import Array
 from .print_shape import nearest
 
-Array = NDArray[np.float64]
 Map = NDArray[np.uint8]
 
 ALONG, ACROSS = 192, 72

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..legs.foot_lock import lock, moved, slides, travelling, underside_on
@@ -15,15 +14,13 @@ from ..legs.grounding import Response, has_ankle, leg_of, leg_soles, stand, with
 from ..legs.sole_rim import posed_rim
 from ..loads.contacts import REST_SPEED
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.orientation import rotation_vectors
 from ..numerics.rigid import carried, displacement, rotation
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""

@@ -7,18 +7,15 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..legs.foot_lock import Underside
 from ..legs.foot_placement import PressedGround, between_contacts, posed_points
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.orientation import rotation_vectors
 from ..numerics.plane_fit import fitted_slope
 from ..numerics.rigid import carried, displacement, rotation, turn_between
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 HoldMode = Literal["ROLL", "HEEL", "BALL", "FLAT", "FULL"]
 MODES: tuple[HoldMode, ...] = get_args(HoldMode)

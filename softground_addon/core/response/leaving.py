@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from math import floor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..legs.grounding import leg_soles
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Mask
 from ..numerics.intervals import runs
 from ..record.footprints import Footprint
-
-Mask = NDArray[np.bool_]
 
 LEAVE_TIME = 0.15
 """Time before its toe-off at which a foot starts to leave a deep print [s], for an adult, if another one stands."""
@@ -25,7 +23,6 @@ def leaving_early(motion: CharacterMotion, touching: Mask, footprints: Sequence[
 
     Parameters
     ----------
-    motion : CharacterMotion
     touching : (F, S) bool array
         At its frames.
     footprints : sequence of Footprint

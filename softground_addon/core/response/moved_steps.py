@@ -6,19 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..legs.foot_lock import eased, turned_level
 from ..legs.grounding import leg_of, leg_soles, out_of_reach
 from ..legs.hips import hips_go_along
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.rigid import carried
 from ..record.edits import StepEdit, edits_by_number, step_id
 from ..record.footprints import Footprint
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 HIPS_TIME = 0.2
 """Standard deviation of the smoothing of hips that go along with moved steps [s], for an adult: half of a step."""
@@ -54,7 +51,6 @@ class Followed:
         By sole, its level displacement.
     hips : (F, 2) float array
         Displacement of the hips [m].
-    out_of_reach : tuple of OutOfReach
     """
 
     carries: Mapping[int, Array] = field(default_factory=dict)
@@ -91,7 +87,6 @@ def follow(
     touching : (F, S) bool array
     footprints : sequence of Footprint
         As they were baked, of all characters.
-    edits : mapping of step id to StepEdit
     """
     moved = list(_moved(motion, touching, footprints, edits))
     if not moved:

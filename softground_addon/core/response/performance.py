@@ -10,13 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DEEP = 0.15
 """Sinkage at which feet are held and arms are out as far as they go, in leg lengths (14 cm for an adult)."""
@@ -94,7 +91,6 @@ def swing_change(path: Array, depth: Array, touching: Mask, performance: Perform
     depth : (F,) float array
         From `sinkage_over_time`.
     touching : (F,) bool array
-    performance : Performance
     leg_length : float [m]
     """
     progress = swing_progress(touching)
@@ -123,7 +119,6 @@ def raised_arms(
         Level direction in which the body faces.
     depth : (F,) float array
         From `body_depth` [m].
-    strength : float
     leg_length : float [m]
     """
     angle = strength * ARMS_OUT * np.clip(depth / (DEEP * leg_length), 0.0, 1.0)

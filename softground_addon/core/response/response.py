@@ -16,6 +16,7 @@ from ..legs.wading import DEPTH_TIME, body_depth
 from ..loads.contacts import Contacts, detect_contacts
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
@@ -24,9 +25,6 @@ from ..record.ground_history import GroundHistory
 from .moved_steps import Followed
 from .performance import BENT, Performance, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 HEADING_TIME = 0.25
 """Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""
@@ -43,7 +41,6 @@ class TiltOptions:
 
     Attributes
     ----------
-    gains : TiltGains
     strength : float
         Part of the controller's lean that the body takes on.
     lateral : float
@@ -113,7 +110,6 @@ def respond(
         At scene frames.
     history : GroundHistory
         With all footprints that the ground holds, of all characters.
-    tilt, grounding : options, or None to leave that out
     standing : (F, S) bool array, optional
         Where grounded soles stand in their prints, if not as long as they touch (`leaving_early`).
     followed : Followed, optional

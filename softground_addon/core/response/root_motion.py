@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..legs.foot_lock import rolled, underside_on
 from ..loads.estimate import CharacterLoads
 from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .response import at_scene_frames
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BOTH = 0.5
 """Pieces of a sole with this part as many points on the belt both count for its speed, as the foot rolls over them."""
@@ -34,7 +31,6 @@ def lacking_velocity(motion: CharacterMotion, loads: CharacterLoads, terrain: Te
         At scene frames.
     loads : CharacterLoads
         Of the same motion, on its time grid.
-    terrain : Terrain
     """
     if treadmill_speed(loads.motion, loads.contacts) == 0.0:
         return None
@@ -56,7 +52,6 @@ def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -
     motion : CharacterMotion
         At scene frames.
     touching : (F, S) bool array
-    terrain : Terrain
     """
     floor = GroundHistory(terrain)
     frames, moves = [np.zeros(0, np.intp)], [np.zeros((0, 2))]

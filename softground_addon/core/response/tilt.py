@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from math import ceil, pi, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 SUBSTEP_RATE = 480.0
 """Lowest rate of the integration [Hz]: a multiple of 24, 30, 60 and 120."""
@@ -69,7 +68,6 @@ def capsule_inertia(mass: float, height: float, radius: float) -> float:
 
     Parameters
     ----------
-    mass : float [kg]
     height, radius : float
         The height includes both caps [m].
     """
@@ -105,7 +103,6 @@ def lean(
         Angle of the ground under the body, along the x and the y axis, positive where it rises [rad].
     frame_rate : float
         [Hz]
-    gains : TiltGains
     supported : (F,) float array, optional
         1 where the body stands, 0 where nothing touches: there no torque turns it back, and it comes to rest.
 
@@ -180,7 +177,6 @@ def along_heading(slope: Array, heading: Array, lateral: float) -> Array:
     slope : (F, 2) float array [rad]
     heading : (F, 2) float array
         Unit vectors, or 0 where there is no heading.
-    lateral : float
     """
     ahead = np.sum(slope * heading, axis=1, keepdims=True) * heading
     return np.asarray(ahead + lateral * (slope - ahead))

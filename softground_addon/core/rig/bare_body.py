@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import CENTRE, Array, CharacterMotion
+from ..motion.motion import CENTRE, CharacterMotion
+from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import unit
 from ..numerics.slices import Slices, sliced
 from ..skin.rigid_parts import moves_as_one, rigid_motions, rigid_parts
@@ -17,7 +18,7 @@ from .bones import RestBone, RigBones
 from .mapping import RigMapping, SoleSource
 from .motion_assembly import assemble_motion
 from .recording import Recording, SceneUnits
-from .rig_skin import Indices, RigSkin
+from .rig_skin import RigSkin
 from .skin_mass import centre_of_volume
 from .skin_stances import LONGEST, skin_stances
 
@@ -115,7 +116,7 @@ def with_toes(sources: Sequence[SoleSource], recording: Recording) -> tuple[Sole
     """Contacts of several parts as feet whose foremost part are the toes; limbs stay as they are."""
 
     def ahead(part: str, source: SoleSource) -> float:
-        """How far a part is before the main one along its front."""
+        """Distance of a part before the main one, along its front."""
         main, other = recording.bone(source.bone), recording.bone(part)
         return float(np.median(((other[:, :3, 3] - main[:, :3, 3]) * main[:, :3, 1]).sum(axis=1)))
 
@@ -159,11 +160,11 @@ def _joint(body: BareBody, foot: str, toes: str, recording: Recording) -> Array:
     gap = np.linalg.norm(far[:, None] - near, axis=-1)
     touching = gap.min(axis=1) <= gap.min() + JOINT * np.ptp(far, axis=0).max()
     start = far[touching].mean(axis=0)
-    one, other = (
+    first, other = (
         np.swapaxes(recording.poses[:, number], 1, 2) @ np.linalg.inv(body.bones[name].matrix)
         for number, name in zip(numbers, (foot, toes), strict=True)
     )
-    apart = one - other
+    apart = first - other
     turns, gaps = apart[:, :3, :3].reshape(-1, 3), (apart[:, :3, :3] @ start + apart[:, :3, 3]).ravel()
     return np.asarray(start - np.linalg.solve(turns.T @ turns + STIFF * len(apart) * np.eye(3), turns.T @ gaps))
 
@@ -179,10 +180,8 @@ def body_motion(
     ----------
     name : str
         The character's.
-    body : BareBody
     mapping : RigMapping
         Its soles are on parts.
-    recording : Recording
     mass : float
         [kg]
     skin_mass : float

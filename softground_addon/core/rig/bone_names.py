@@ -117,7 +117,6 @@ def read_names(bones: RigBones, deforming: Set[str]) -> list[BoneName]:
 
     Parameters
     ----------
-    bones : RigBones
     deforming : set of str
         Names of those that move a mesh.
     """
@@ -126,8 +125,8 @@ def read_names(bones: RigBones, deforming: Set[str]) -> list[BoneName]:
     shared = {word for word, count in first.items() if count > _COMMON_PREFIX_SHARE * len(split) and len(split) > 4}
     names = []
     for bone, words in split.items():
-        kept = words[1:] if words and words[0] in shared else words
-        name = _read(bone, kept, deforms=bone in deforming, depth=len([*above(bones, bone)]))
+        significant = words[1:] if words and words[0] in shared else words
+        name = _read(bone, significant, deforms=bone in deforming, depth=len([*above(bones, bone)]))
         if name:
             names.append(name)
     return names

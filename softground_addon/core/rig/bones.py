@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,6 @@ class RestBone:
     matrix : (4, 4) float array
         Its frame, whose y axis points from head to tail.
     head, tail : (3,) float arrays
-    length : float
     """
 
     parent: str

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import CENTRE, Array, CharacterMotion
+from ..motion.motion import CENTRE, CharacterMotion
 from ..motion.props import capsule
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array
 from ..numerics.interpolation import in_stretches
 from ..numerics.rigid import displacement, nearest_rotation, unit
 from ..soles.foot_attitude import (
@@ -63,10 +64,6 @@ def assemble_motion(
     ----------
     name : str
         The character's.
-    bones : RigBones
-    mapping : RigMapping
-    recording : Recording
-    skin : RigSkin or None
     mass : float
         [kg]
     carried : mapping of str to SoleMotion

@@ -30,7 +30,6 @@ def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
 
     Parameters
     ----------
-    bones : RigBones
     deforming : set of str
         Names of those that move a mesh.
     """

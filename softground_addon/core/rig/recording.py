@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 
 _STILL = 1e-4
 """Poses that differ by less are one, over their largest entry."""
@@ -24,13 +24,17 @@ class SceneUnits:
         Scene frames per second [Hz].
     time_stretch : float
         Frames of the animation per frame of the scene.
-    gravity_m_s2, unit_scale_m : float
     """
 
     frame_rate: float
     time_stretch: float
     gravity_m_s2: float
     unit_scale_m: float
+
+    @property
+    def units(self) -> SceneUnits:
+        """These alone, without the settings that they are part of."""
+        return SceneUnits(self.frame_rate, self.time_stretch, self.gravity_m_s2, self.unit_scale_m)
 
 
 @dataclass(frozen=True)

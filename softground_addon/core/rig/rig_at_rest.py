@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.rigid import rotation, turn_between, unit
 from ..soles.foot_attitude import UP
 from .bones import RigBones
@@ -28,7 +28,6 @@ class RestPose:
 
     Attributes
     ----------
-    bones : RigBones
     world : (4, 4) float array
         Armature space to world [m].
     tilts : (F, 3, 3) float array

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..skin.skin_motion import SkinMotion
 from ..skin.twins import twins
 from .bones import RigBones, above
 from .recording import Recording
-
-Indices = NDArray[np.intp]
 
 _AGAINST = 0.01
 """Boxes around parts that are nearer than this over the size of the mesh touch."""
@@ -93,8 +91,6 @@ def skinned(
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     chosen : (N,) int array
@@ -151,7 +147,6 @@ class FollowedSkin:
 
     Attributes
     ----------
-    motion : SkinMotion
     bones : tuple of str
         Bone of each part of the motion; empty where only the armature moves it.
     """
@@ -168,8 +163,6 @@ def followed_skin(
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     rate : float

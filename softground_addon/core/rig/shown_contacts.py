@@ -27,8 +27,6 @@ def shown_by_skin(bones: RigBones, skin: RigSkin, recording: Recording) -> Slice
 
     Parameters
     ----------
-    bones : RigBones
-    skin : RigSkin
     recording : Recording
         Of all `skin.bones`.
     """

@@ -6,7 +6,7 @@ from math import floor, log10
 
 import numpy as np
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..skin.volume import body_volume, welded
 from .bones import RigBones
@@ -23,8 +23,6 @@ def skin_mass(skin: RigSkin, bones: RigBones, pose: Recording) -> Slices[float]:
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     pose : Recording
         Of all `skin.bones`, at one frame.
     """
@@ -47,8 +45,6 @@ def centre_of_volume(skin: RigSkin, bones: RigBones, recording: Recording) -> Ar
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     recording : Recording
         Of all `skin.bones`.
     """

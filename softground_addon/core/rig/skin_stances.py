@@ -68,8 +68,6 @@ def skin_stances(
 
     Parameters
     ----------
-    skin : RigSkin
-    bones : RigBones
     mapping : RigMapping
         Only its soles on bones count.
     recording : Recording

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..soles.foot_attitude import FlatFoot, FootSize
 from ..soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
 from .bones import RigBones, family
@@ -46,12 +46,10 @@ def foot_sole(
 
     Parameters
     ----------
-    source : SoleSource
     flat : FlatFoot
         Attitude of the standing foot.
     size : FootSize
         Size by the bones; not used where there is a mesh.
-    mesh : FootMesh or None
     has_toes : bool
         True if the toes bend.
     mirrored : bool
@@ -107,7 +105,6 @@ def skin_meshes(
 
     Parameters
     ----------
-    skin : RigSkin or None
     families : mapping of str to (bones, toes)
         Names of the bones, and of those among them that are toes.
     rest_world : (4, 4) float array

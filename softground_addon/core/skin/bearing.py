@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import hysteresis, runs
-from .skin_motion import CALM_SPEED, Array, Mask, PartTracks
+from .skin_motion import CALM_SPEED, PartTracks
 
 TOUCH, LEAVE = 0.015, 0.018
 """A part below the first height over the ground starts to bear, one above the second has lifted, in body heights."""
@@ -40,7 +41,6 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
 
     Parameters
     ----------
-    tracks : PartTracks
     level : float
         Height of the ground [H].
     drift : (2,) float array

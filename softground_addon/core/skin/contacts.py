@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from .bearing import bearing, without_glimpses
 from .footing import footing_of
 from .ground_level import ground_of
 from .merging import merged, moving_alike
-from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
+from .skin_motion import PartTracks, SkinMotion, track_parts
 
 SHORT = 0.2
 """A contact that is never seen to last as long may be a brush [s]."""
@@ -62,7 +63,6 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
 
     Parameters
     ----------
-    skin : SkinMotion
     groups : (P,) int array, optional
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """

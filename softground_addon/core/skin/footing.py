@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from .bearing import LEAST_SLIP, STILL, TOUCH
-from .skin_motion import Array, Mask, PartTracks
+from .skin_motion import PartTracks
 
 TRAVELS = 1.0
 """Longest way of a character that stays on one level, in body heights."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from .bearing import TOUCH
-from .skin_motion import Array, PartTracks
+from .skin_motion import PartTracks
 
 REACH = 0.05
 """Largest height of resting skin over the lowest skin, in body heights."""

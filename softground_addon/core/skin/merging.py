@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .skin_motion import Indices, Mask, PartTracks, SkinMotion
+from ..numerics.arrays import Indices, Mask
+from .skin_motion import PartTracks, SkinMotion
 
 HOPS = 2
 """Parts of one contact are at most so far apart in the graph of parts."""
@@ -31,9 +32,9 @@ def moving_alike(skin: SkinMotion) -> Mask:
     if skin.twin is not None:
         followed = np.flatnonzero(skin.twin >= 0)
         alike[followed, skin.twin[followed]] = False
-    for one, other in zip(*np.nonzero(alike), strict=True):
-        apart = np.linalg.norm(middle[:, one] - middle[:, other], axis=-1)
-        alike[one, other] = np.ptp(apart) < ALIKE * skin.height
+    for this, other in zip(*np.nonzero(alike), strict=True):
+        apart = np.linalg.norm(middle[:, this] - middle[:, other], axis=-1)
+        alike[this, other] = np.ptp(apart) < ALIKE * skin.height
     return alike & alike.T
 
 
@@ -42,7 +43,6 @@ def merged(tracks: PartTracks, bears: Mask, links: Mask, alike: Mask, twin: Indi
 
     Parameters
     ----------
-    tracks : PartTracks
     bears : (F, P) bool array
     links : (P, P) bool array
         Which parts hang together.

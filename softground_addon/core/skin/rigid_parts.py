@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.components import components
 from ..numerics.rigid import displacement, nearest_rotation
 from ..numerics.slices import Slices, sliced
-from .skin_motion import Array, Indices
 from .volume import welded
 
 FIT = 0.005
@@ -147,9 +147,9 @@ def _against(rest: Array, part: Indices, mover: Indices, gap: float) -> Indices:
     lead, pairs = order[first], [np.zeros((2, 0), dtype=np.intp)]
     for number in np.unique(mover):
         those = np.flatnonzero(mover[lead] == number)
-        for at, one in enumerate(those):
+        for at, piece in enumerate(those):
             others = those[at + 1 :]
-            apart = np.maximum(low[one] - high[others], low[others] - high[one]).max(axis=-1)
+            apart = np.maximum(low[piece] - high[others], low[others] - high[piece]).max(axis=-1)
             near = lead[others[apart < gap]]
-            pairs.append(np.stack([np.full(len(near), lead[one]), near]))
+            pairs.append(np.stack([np.full(len(near), lead[piece]), near]))
     return np.concatenate(pairs, axis=1)

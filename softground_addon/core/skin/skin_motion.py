@@ -7,11 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.slices import Slices, sliced
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 PATCH = 0.008
 """Height of the lowest patch of a part above its lowest point, in body heights."""
@@ -133,7 +130,6 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
 
     Parameters
     ----------
-    skin : SkinMotion
     group : (P,) int array, optional
         Number of the group that each part is in, to track groups in place of parts; -1 for none.
     floor : float

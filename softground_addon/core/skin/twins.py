@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import unit
-from .skin_motion import Array, Indices
 
 AS_MANY = 0.2
 """Numbers of vertices of a part and its twin differ by less than this share."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.components import components
 from ..numerics.slices import Slices, sliced
-from .skin_motion import Array, Indices, Mask
 
 SLICES = 64
 """Slices along each axis."""

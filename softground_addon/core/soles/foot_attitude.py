@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Array
+from ..numerics.arrays import Array
 from ..numerics.rigid import unit
 from .soles import ANKLE_HEIGHT, ANKLE_POSITION, BALL_POSITION, FOOT_TO_LEG
 
@@ -249,7 +249,6 @@ def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: floa
 
     Parameters
     ----------
-    flat : FlatFoot
     ankle_tip : (3,) float array
         End of the last bone of the foot in the rest pose [m].
     ball : (3,) float array or None

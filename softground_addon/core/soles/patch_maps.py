@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.sole_motion import SolePatch
+from ..numerics.arrays import Array
 
-Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 """Values of many cells at many steps: fractions and heights near the ground, where 32 bits are plenty."""
 

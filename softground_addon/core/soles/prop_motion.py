@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..motion.motion import Array
 from ..motion.props import mass_properties
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array
 from ..numerics.rigid import displacement, nearest_rotation
 from .soles import prop_sole
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..motion.motion import Array
 from ..motion.props import Prop, supports
 from ..motion.sole_motion import Sole, SolePatch
+from ..numerics.arrays import Array
 from ..numerics.bilinear import sample_map
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
@@ -86,7 +86,6 @@ class PlacedSole:
 
     Attributes
     ----------
-    sole : Sole
     placements : (P, 4, 4) float array
         Patch frame to sole frame [m].
     """

@@ -78,26 +78,40 @@ def lowest_surface(
     Upright triangles have no underside and are left out.
     """
     rows, columns = shape
-    corners = vertices[triangles]
-    flat = (corners[..., :2] - origin) / spacing
+    places = (vertices[:, :2] - origin) / spacing
+    first, last = _nodes_within(places, triangles, (columns, rows))
+    holds = np.flatnonzero((first[:, 0] <= last[:, 0]) & (first[:, 1] <= last[:, 1]))  # few triangles of a fine mesh
+    triangles, first, last = triangles[holds], first[holds], last[holds]
+    flat = places[triangles]
     lying = np.abs(cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
-    corners, flat = corners[lying], flat[lying]
-    a, b, c = np.moveaxis(flat, 1, 0)  # over an axis of three, pairs are many times faster than a reduction
-    first = np.clip(np.ceil(np.minimum(np.minimum(a, b), c)).astype(int), 0, (columns, rows))
-    last = np.clip(np.floor(np.maximum(np.maximum(a, b), c)).astype(int), -1, (columns - 1, rows - 1))
-    size = np.maximum(last - first + 1, 0)
+    heights, flat, first, last = vertices[triangles[lying], 2], flat[lying], first[lying], last[lying]
+    size = last - first + 1
     count = size.prod(axis=1)
     order = np.cumsum(count)
 
     buffer = np.full(rows * columns, np.inf)
     start = 0
-    while start < len(corners):
+    while start < len(heights):
         done = order[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
         block = slice(start, stop)
-        _draw(buffer, columns, flat[block], corners[block, :, 2], first[block], size[block], count[block])
+        _draw(buffer, columns, flat[block], heights[block], first[block], size[block], count[block])
         start = stop
     return buffer.reshape(shape)
+
+
+def _nodes_within(
+    places: Array, triangles: NDArray[np.intp], nodes: tuple[int, int]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """First and last column and row of the nodes in the box around each triangle, (T, 2) each."""
+    first, last = np.empty((2, len(triangles), 2), dtype=np.int32)
+    a, b, c = np.ascontiguousarray(triangles.T)
+    for axis, (count, along) in enumerate(zip(nodes, places.T, strict=True)):
+        after = np.clip(np.ceil(along), 0, count).astype(np.int32)
+        before = np.clip(np.floor(along), -1, count - 1).astype(np.int32)
+        np.minimum(np.minimum(after.take(a), after.take(b)), after.take(c), out=first[:, axis])
+        np.maximum(np.maximum(before.take(a), before.take(b)), before.take(c), out=last[:, axis])
+    return first, last
 
 
 def _draw(

@@ -12,16 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.display_blur import CUT_OFF, blurred_window
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import SparseGrid, Window
+from ..numerics.arrays import Array
 from .weather import PARTS, Span, matter_of
 from .weather_course import Course, Weather, course_of
 from .weather_places import SIGMAS, shares
-
-Array = NDArray[np.float64]
 
 LARGEST = 1e9
 """Largest number of a stored weather, in SI units and frames: a larger one is damage."""
@@ -33,7 +31,6 @@ class FeltWeather(Weather):
 
     Attributes
     ----------
-    surface : str
     first, last : float
         The scene frames that it is known in parts of.
     frame_rate : float
@@ -82,7 +79,6 @@ class PrintsInWeather:
 
     Parameters
     ----------
-    weather : FeltWeather
     layer_depth : float
         Of the loose layer [m].
 

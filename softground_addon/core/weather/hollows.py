@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.components import components
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 SHALLOWEST = 1e-3
 """Hollows that hold less water than this at their deepest are none [m]."""

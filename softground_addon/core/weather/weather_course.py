@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from . import weather as w
 from .weather import MOMENTS, NO_WATER, PARTS, Span
 
-Array = NDArray[np.float64]
 Rate = float | Sequence[float] | Array
 
 KEYED = ("snowfall", "temperature", "wind", "rain", "drying", "time_scale")
@@ -177,13 +176,10 @@ def steady_table(
     ----------
     weather : Weather
         Of numbers.
-    matter : Matter
     soaking : (float, float)
         Remaining shares of the hollows' soaking at which water is known.
-    ages : int
     per_frame : int
         Ages in a frame.
-    frame_rate : float
 
     Returns
     -------

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from ..ground.display_blur import CUT_OFF, blurred, blurred_window
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, overlaps, side_by_side
+from ..numerics.arrays import Array
 from ..numerics.cell_keys import among, keys_at, keys_of
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
-
-Array = NDArray[np.float64]
 
 SIGMAS = (0.01, 0.03, 0.09)
 """Standard deviations at which the relief is known besides its own [m]; in between, linear in the variance."""
@@ -94,7 +93,6 @@ def weather_places(
 
     Parameters
     ----------
-    footprints : sequence of Footprint
     position : (K, 3) float array
         Their undisturbed world positions [m].
     relief : (K,) float array

@@ -99,11 +99,11 @@ def test_auto_rig_pro_is_keyed_on_what_its_animators_key_in_ik_and_in_fk(scene):
     set_up(armature)
     mapping = responders.mapping_of(scene.softground.characters[0])
     assert [source.bone for source in mapping.soles][:2] == ["foot.l", "foot.r"]
-    by_ik = {control.bone for control in controls_of(scene, armature, mapping)}
+    by_ik = {control.bone for control in controls_of(scene.view_layers[0], armature, mapping)}
     assert by_ik >= {"c_root_master.x", "c_foot_ik.l", "c_foot_ik.r"}
     assert not [bone for bone in by_ik if "fk" in bone]
     auto_rig_pro.switch_to_fk(armature)
-    by_fk = {control.bone for control in controls_of(scene, armature, mapping)}
+    by_fk = {control.bone for control in controls_of(scene.view_layers[0], armature, mapping)}
     legs = {f"c_{part}_fk.{side}" for part in ("thigh", "leg", "foot") for side in "lr"}
     assert by_fk >= {"c_root_master.x", *legs}
     assert not [bone for bone in by_fk if "_ik" in bone]

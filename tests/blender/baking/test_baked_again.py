@@ -5,8 +5,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softground_addon.blender import jobs
-from softground_addon.blender.baking import bake_job, shot_prints
+from softground_addon.blender import jobs, kept
+from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.state import state
@@ -92,20 +92,26 @@ def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, cha
     for name, value in changes:
         CHANGES[name](scene, value)
         as_it_comes = left(scene)
-        shot_prints.forget()
+        kept.forget()
         assert left(scene) == as_it_comes, name
+
+
+def anew(scene, change=lambda: None):
+    """What a bake after a change works out anew, of what is kept."""
+    change()
+    before = {name: held[1] for name, held in state.kept.items()}
+    bake(scene)
+    return {name for name, held in state.kept.items() if before.get(name) is not held[1]}
 
 
 def presses(scene, change=lambda: None):
     """True if a bake after a change presses prints."""
-    change()
-    before = state.prints
-    bake(scene)
-    return state.prints is not before
+    return "prints" in anew(scene, change)
 
 
-def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again):
-    bake(again)
+@pytest.mark.parametrize("sink_feet", [False, True])
+def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again, sink_feet):
+    bake(again, sink_feet=sink_feet)
     for name in ("relief_strength", "relief", "tread", "shape_keys"):
         assert not presses(again, lambda name=name: CHANGES[name](again, 2)), name
 
@@ -132,16 +138,47 @@ def test_edits_of_steps_have_them_pressed_anew_and_come_with_the_bake(again):
     assert baked_ground.record_of(ground).edited[0].compressed_m3 == half.compressed_m3
 
 
+MOTION = "motion of Walker"
+
+
+@pytest.mark.parametrize(
+    ("name", "follows"),
+    [
+        ("nothing", set()),
+        ("relief", set()),
+        ("pressure", {"prints"}),
+        ("preset", {"prints"}),
+        ("cell_size", {"prints"}),
+        ("mass", {"prints", "loads", MOTION}),
+        ("keys", {"prints", "loads", MOTION}),
+        ("shoes", {"prints", "loads", "terrain", MOTION}),
+        ("ground", {"prints", "loads", "terrain", MOTION}),  # the bake is cleared before
+    ],
+)
+def test_a_bake_works_out_only_what_follows_from_what_has_changed(again, name, follows):
+    bake(again)
+    assert anew(again, lambda: CHANGES[name](again, 1)) == follows
+
+
+@pytest.mark.parametrize("value", [0.05, 0.3])
+def test_landings_follow_the_time_that_the_ground_needs(again, value):
+    again.softground.characters[0].force_model = "IMPULSE"
+    bake(again)
+    assert "loads" in anew(again, lambda: setattr(again.softground.material, "characteristic_time", value))
+    assert left(again) == (kept.forget(), left(again))[1]
+
+
 def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):
     bake(again)
-    assert 0 < shot_prints._size(state.prints) < 50 * len(baked_ground.stored_record(again.softground.ground))
+    held = kept._size(*(each[1] for each in state.kept.values()))
+    assert 0 < held < 80 * len(baked_ground.stored_record(again.softground.ground))
     bpy.ops.softground.clear_bake()
-    assert state.prints is None
-    monkeypatch.setattr(shot_prints, "LARGEST", 1000)
+    assert not state.kept
+    monkeypatch.setattr(kept, "LARGEST", held // 2)
     bake(again)
-    assert state.prints is None
+    assert sum(each[2] for each in state.kept.values()) <= held // 2
     monkeypatch.undo()
     bake(again)
-    assert state.prints is not None
+    assert "prints" in state.kept
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert state.prints is None
+    assert not state.kept

@@ -11,7 +11,6 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, created_ground
 from softground_addon.blender.jobs import Progress, meanwhile, run
 from softground_addon.blender.live import live, live_start
-from softground_addon.blender.operators import live_footprints
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
 from softground_addon.core.composers.ground_plan import GroundPlan
@@ -121,7 +120,8 @@ def live_job(scene, *, keep):
         live.begin((yield from live_start.starting(scene)))
     else:
         with analysis.own_changes(scene):
-            yield from live_footprints._ended(state.live, scene, keep=True)
+            yield from state.live.keeping(scene)
+            live.forget()
 
 
 def create_plane():

@@ -382,7 +382,7 @@ def test_a_cane_on_the_hand_prints_with_its_tip_and_carries_its_share(scene):
     cane = bpy.context.active_object
     cane.name = "Cane.L"
     rigs.key(cane, "location", {1: (0.3, 0, 0.45), 20: (0.3, 0, 0.45)})
-    assert add_object_contacts(scene, character, [cane]) == ["Cane.L"]
+    assert add_object_contacts(scene.softground, character, [cane]) == ["Cane.L"]
     assert character.soles[-1].side == "LEFT"
     (motion,) = jobs.run(read_shot(scene, settings_of(scene))).motions
     sole = motion.soles[-1]

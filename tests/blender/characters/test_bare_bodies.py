@@ -99,12 +99,12 @@ def test_reading_a_body_writes_nothing_of_the_users(scene):
 def test_a_bake_is_outdated_where_a_part_moves_otherwise_or_has_another_shape(scene):
     top = robot(scene, frames=30)
     add_character(scene, top)
-    before = staleness.of_movers(scene, settings.snapshot(scene))
+    before = staleness.of_movers(scene.objects, settings.snapshot(scene))
     leg = bpy.data.objects["leg.L"]
     leg.keyframe_insert("scale", frame=1)
-    moved = staleness.of_movers(scene, settings.snapshot(scene))
+    moved = staleness.of_movers(scene.objects, settings.snapshot(scene))
     leg.data.vertices[0].co.x += 0.01
-    shaped = staleness.of_movers(scene, settings.snapshot(scene))
+    shaped = staleness.of_movers(scene.objects, settings.snapshot(scene))
     assert {key.split(":")[0] for key in before if before[key] != moved[key]} >= {"animation"}
     assert {key.split(":")[0] for key in moved if moved[key] != shaped[key]} == {"body"}
 

@@ -63,7 +63,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     assert armature.parent.name == "Walker Scale"
     assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
     assert keys == keys_of(armature)
-    assert size_of(scene, armature) == pytest.approx(character.size, rel=1e-4)
+    assert size_of(scene.unit_settings.scale_length, armature) == pytest.approx(character.size, rel=1e-4)
     assert 1.0 < character.size < 2.0
     assert character.mass == pytest.approx(mass, rel=0.05)
     scene.softground.cell_size = 0.02
@@ -133,8 +133,8 @@ def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names
     armature = shots.walker(scene, frames=30)
     bpy.data.objects.remove(armature.children[0])
     bpy.ops.softground.add_character()
-    assert scale_to_metres(stature_of(scene, armature), captured=True) == 1.0
-    armature.scale = (0.42 / stature_of(scene, armature),) * 3
+    assert scale_to_metres(stature_of(scene.unit_settings.scale_length, armature), captured=True) == 1.0
+    armature.scale = (0.42 / stature_of(scene.unit_settings.scale_length, armature),) * 3
     bpy.context.view_layer.update()
     scene.softground.cell_size = 0.01
     (finding,) = (one for one in bake(scene).report["self_check"] if one["code"] == "unit_scale")
@@ -143,6 +143,6 @@ def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names
     bpy.ops.softground.clear_bake()
     bpy.ops.softground.fix_scale()
     bpy.context.view_layer.update()
-    assert stature_of(scene, armature) == pytest.approx(1.68, rel=0.01)
+    assert stature_of(scene.unit_settings.scale_length, armature) == pytest.approx(1.68, rel=0.01)
     scene.softground.cell_size = 0.02
     assert "unit_scale" not in codes(bake(scene).report)

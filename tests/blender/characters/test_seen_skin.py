@@ -74,7 +74,7 @@ def solid(body):
 def test_the_skin_that_is_read_is_the_skin_that_is_seen(scene, body, shape):
     shape(body)
     armature, before = body.parent, {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "scenes")}
-    skin = read_skin(scene, armature)
+    skin = read_skin(scene.objects, armature)
     shapes = [one.key for one in skin.shapes]
     recording = list_of(record(scene, armature, range(1, 21), skin.bones, units_of(scene), shapes=shapes))
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
@@ -103,18 +103,18 @@ def list_of(reading):
 
 def test_what_acts_on_the_posed_mesh_is_said_to_be_left_out(scene, body):
     bpy.ops.softground.add_character()
-    assert shapes_left_out(scene, snapshot(scene)) == []
+    assert shapes_left_out(scene.objects, snapshot(scene)) == []
     body.modifiers.new("Suit", "CLOTH")
-    hung = [finding.message for finding in shapes_left_out(scene, snapshot(scene))]
+    hung = [finding.message for finding in shapes_left_out(scene.objects, snapshot(scene))]
     assert hung == [f"The skin of '{body.name}' was read without the modifier 'Suit'."]
 
 
 @pytest.mark.parametrize("change", [thick_soles, keyed, swollen])
 def test_a_shape_that_is_changed_makes_a_bake_outdated(scene, body, change):
     bpy.ops.softground.add_character()
-    before = staleness._of_body(scene, snapshot(scene).characters[0])
+    before = staleness._of_body(scene.objects, snapshot(scene).characters[0])
     change(body)
-    after = staleness._of_body(scene, snapshot(scene).characters[0])
+    after = staleness._of_body(scene.objects, snapshot(scene).characters[0])
     assert after != before
     scene.frame_set(5)
-    assert staleness._of_body(scene, snapshot(scene).characters[0]) == after
+    assert staleness._of_body(scene.objects, snapshot(scene).characters[0]) == after

@@ -86,7 +86,7 @@ def test_shoes_on_a_rig_of_their_own_print_as_the_feet_of_the_body_do(scene, way
     parted, parted_depths = prints(scene)
     assert parted == whole
     assert parted_depths == pytest.approx(depths, rel=0.02)
-    assert shoes in bodies_of(scene, snapshot(scene))
+    assert shoes in bodies_of(scene.objects, snapshot(scene))
 
 
 def test_hair_on_a_bone_and_a_skirt_that_goes_along_are_worn_whatever_keys_move_the_hair(scene):
@@ -101,8 +101,8 @@ def test_hair_on_a_bone_and_a_skirt_that_goes_along_are_worn_whatever_keys_move_
         mesh = copy_of(body, f"{rig.name} Mesh")
         mesh.parent = mesh.modifiers[0].object = rig
     bpy.context.view_layer.update()
-    assert worn_rigs(scene, walker) == [hair, skirt]
-    assert not worn_rigs(scene, hair) + worn_rigs(scene, skirt)
+    assert worn_rigs(scene.objects, walker) == [hair, skirt]
+    assert not worn_rigs(scene.objects, hair) + worn_rigs(scene.objects, skirt)
     set_up_automatically(scene)
     assert added(scene) == [walker]
 
@@ -125,7 +125,7 @@ def test_a_body_that_moves_as_another_does_is_a_character_of_its_own(scene, who)
     body = copy_of(walker.children[0], "Other Body")
     body.parent = body.modifiers[0].object = other
     bpy.context.view_layer.update()
-    assert worn_rigs(scene, walker) == worn_rigs(scene, other) == []
+    assert worn_rigs(scene.objects, walker) == worn_rigs(scene.objects, other) == []
     select(walker, other)
     bpy.ops.softground.add_character()
     assert added(scene) == [walker, other]

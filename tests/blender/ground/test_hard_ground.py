@@ -10,7 +10,7 @@ import pytest
 
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_report, clean_feet
-from softground_addon.blender.operators import remedies
+from softground_addon.blender.operators import bake_result
 from softground_addon.blender.reading.shots import read_shot, settings_of
 from softground_addon.core.composers.responses import standing_on
 from softground_addon.core.composers.shot_loads import loads_of_shot
@@ -114,13 +114,13 @@ def test_the_warning_has_a_button_that_adds_the_crate_and_the_bake_notices_when_
     warnings, drawn = bake(scene).report["warnings"], []
     layout = MagicMock()
     layout.operator.side_effect = lambda name, **how: drawn.append((name, button := SimpleNamespace(**how))) or button
-    remedies.draw(layout, scene, warnings)
+    bake_result.draw_remedies(layout, scene.softground, warnings)
     ((name, button),) = drawn
     assert (name, button.text, button.object) == ("softground.add_hard_ground", "Add 'Crate'", "Crate")
     bpy.ops.softground.add_hard_ground(object=button.object)
     assert settings.hard_grounds_of(scene.softground) == [crate]
     drawn.clear()
-    remedies.draw(layout, scene, warnings)
+    bake_result.draw_remedies(layout, scene.softground, warnings)
     assert not drawn
     assert bake_report.stale_reasons(scene) == ("The settings have changed",)
     bake(scene)

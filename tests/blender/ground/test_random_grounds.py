@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender import jobs
 from softground_addon.blender.baking import step_edits
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.live import live
@@ -81,9 +82,13 @@ def pressed(operator, **values):
 def edit_a_step(chance, scene):
     """Change a step of the bake, where there is one that can be."""
     try:
-        bake = step_edits.editable(scene)
+        bake = jobs.run(step_edits.reading(scene))
         name = step_id(chance.choice(bake.left.footprints))
-        step_edits.edit(scene, bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)})
+        jobs.run(
+            step_edits.editing(
+                scene, bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)}
+            )
+        )
     except InputError:
         pass
 

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_slots, settings
+from softground_addon.blender import ground_slots, jobs, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
@@ -139,10 +139,10 @@ def test_a_face_attribute_counts_in_place_of_the_materials(four):
 def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     choose()
     bake(four)
-    editable = step_edits.editable(four)
+    editable = jobs.run(step_edits.reading(four))
     number, step = next((n, s) for n, s in enumerate(editable.left.steps) if where(s.baked) == 0)
     edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
-    step_edits.edit(four, editable, {step.name: edit})
+    jobs.run(step_edits.editing(four, editable, {step.name: edit}))
     left = baked_ground.record_of(four.softground.ground).steps[number].left
     assert left.surface == "mud"
     assert left.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
@@ -255,7 +255,7 @@ def test_what_the_record_says_is_read_back(four):
         (3, "none", ""),
     ]
     choose(("", "", "", ""))
-    made_with = step_edits.editable(four).made_with
+    made_with = jobs.run(step_edits.reading(four)).made_with
     choose()
     assert made_with.regions == settings.snapshot(four).regions
 

@@ -76,7 +76,7 @@ def test_its_camera_sees_the_last_prints_in_a_low_sun(scene):
     bpy.ops.softground.bake()
     seen = [
         [world_to_camera_view(scene, scene.camera, corner) for corner in map(Vector, step.outline())]
-        for step in baked_steps.of(scene)[-4:]
+        for step in baked_steps.of(scene.softground.ground)[-4:]
     ]
     for corners in seen:
         across, up, away = np.transpose(corners)

@@ -435,17 +435,17 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
 def test_the_final_mesh_stands_under_the_weather_of_the_last_frame(opened):
     scene = opened()
     scene.frame_end = 200
-    without = exports.final_mesh(scene, scene.softground.ground).data
+    without = exports.final_mesh(scene.softground.ground).data
     bpy.ops.softground.add_weather(preset="SNOWFALL")
     wanted = positions(scene, 200)
     scene.frame_set(5)
-    still = exports.final_mesh(scene, scene.softground.ground).data
+    still = exports.final_mesh(scene.softground.ground).data
     # The playback adds a height to the place at rest, the mesh holds where that led: they differ by a rounding.
     assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
     assert scene.frame_current == 5
     assert set(still.attributes.keys()) == {*without.attributes.keys(), nodes.WETNESS, nodes.FRESH}
     weather_modifier.modifier_of(carrier(scene)).show_viewport = False
-    plain = exports.final_mesh(scene, scene.softground.ground).data
+    plain = exports.final_mesh(scene.softground.ground).data
     assert contents(plain) == contents(without)
 
 
@@ -456,7 +456,7 @@ def test_the_final_mesh_of_a_slowed_down_scene_stands_under_the_weather_of_its_l
     bpy.ops.softground.bake()
     bpy.ops.softground.add_weather(preset="SNOWFALL")
     wanted = positions(scene, 100)
-    still = exports.final_mesh(scene, scene.softground.ground).data
+    still = exports.final_mesh(scene.softground.ground).data
     assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
 
 
@@ -467,10 +467,10 @@ def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
     wanted, fresh = positions(scene, 200), read(shown(scene, 200), nodes.FRESH)
     there = set(bpy.data.objects)
     if kind == "abc":
-        exports.export_alembic(scene, scene.softground.ground, path, 200, 201)
+        exports.export_alembic(scene.softground.ground, path, 200, 201)
         bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
     else:
-        exports.export_usd(scene, scene.softground.ground, path, 200, 201)
+        exports.export_usd(scene.softground.ground, path, 200, 201)
         bpy.ops.wm.usd_import(filepath=str(path))
     scene.frame_set(200)
     meshes = [obj for obj in set(bpy.data.objects) - there if obj.type == "MESH"]
@@ -710,7 +710,7 @@ def alone(scene, tmp_path, frame):
 @pytest.mark.parametrize(("densest", "deepest"), [(None, 0.25), (0.4, 0.1)])
 def test_hollows_read_compression_against_what_can_be_packed(densest, deepest):
     material = {"blur_sigma": 0.005, "layer_depth": 0.25} | ({"densest": densest} if densest else {})
-    units = dict.fromkeys(baked_ground.UNITS, 1.0)
+    units = {"cell_size_m": 1.0, "time_stretch": 1.0}
     known, _ = weather.of_bake([], {"inputs": {**units, "surface": "soil", "material": material, "weather": None}})
     assert known["layer_depth"] == pytest.approx(deepest)
 

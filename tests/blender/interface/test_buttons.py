@@ -98,7 +98,7 @@ def steps(scene):
     bpy.ops.softground.add_character()
     scene.softground.cell_size = 0.03
     bpy.ops.softground.bake()
-    return [step.name for step in baked_steps.of(scene)]
+    return [step.name for step in baked_steps.of(scene.softground.ground)]
 
 
 def test_each_button_that_changes_steps_works_in_a_window(scene, press, steps):

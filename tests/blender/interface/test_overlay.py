@@ -50,7 +50,9 @@ def test_live_mode_shows_the_cells_of_each_sole_that_touches_as_the_bake_does(sc
         scene.frame_set(frame)
         shown[frame] = overlay._cells(scene)
         soles = [
-            cells for window, mask in live.in_contact(scene)[0] if len(cells := overlay_shapes.marked(window, mask))
+            cells
+            for window, mask in live.in_contact(scene.session_uid)[0]
+            if len(cells := overlay_shapes.marked(window, mask))
         ]
         since = (frames > frame - 1 + 1e-6) & (frames < frame + 1e-6)
         assert len(soles) == touching[since].any(axis=0).sum()  # those that rest or have just left, too

@@ -265,7 +265,7 @@ def test_a_bake_is_expected_to_carve_where_feet_sink_beyond_the_ankle(shot):
     for modulus, carves in ((123e3, True), (3e6, False)):
         material.youngs_modulus = modulus
         bpy.ops.softground.predict_depth()
-        assert prediction.fineness(shot, prediction.of(shot)).is_carved == carves
+        assert prediction.fineness(prediction.asked(shot), prediction.of(shot)).is_carved == carves
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):
@@ -552,7 +552,7 @@ def test_a_depth_that_all_steps_share_is_told_once(typical, deepest, shown):
 def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     def buttons():
         layout = MagicMock()
-        bake_result._warnings(layout, bake_result.warnings_of(shot))
+        bake_result._warnings(layout, bake_result.warnings_of(shot.softground.ground))
         return [call.kwargs["text"] for call in layout.mock_calls]
 
     assert buttons() == []

@@ -10,7 +10,7 @@ from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from softground_addon.blender import registration
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.operators import bake_result, remedies
+from softground_addon.blender.operators import bake_result
 from softground_addon.blender.panels import outdated
 from softground_addon.blender.reading import analysis
 from tests.blender.response.test_root_motion import FRAMES, on_the_spot
@@ -102,6 +102,6 @@ def test_a_remedy_is_for_the_character_that_its_warning_names(scene):
 
 def test_remedies_are_operators_and_settings_that_there_are(addon):
     names = {getattr(cls, "bl_idname", "") for cls in registration.CLASSES}
-    assert names.issuperset([*remedies._OF_CHARACTER.values(), *remedies._OPERATORS.values()])
+    assert names.issuperset([*bake_result._OF_CHARACTER.values(), *bake_result._OPERATORS.values()])
     fields = bpy.context.scene.softground.bl_rna.properties.keys()
-    assert set(remedies._FIELDS.values()) <= set(fields)
+    assert set(bake_result._FIELDS.values()) <= set(fields)

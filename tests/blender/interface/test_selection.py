@@ -108,7 +108,7 @@ def controlled(scene):
 
 def test_of_a_control_rig_and_a_deform_rig_the_one_that_moves_the_skin_is_added(scene):
     control, deform = controlled(scene)
-    assert walkers_of(scene) == [deform]
+    assert walkers_of(scene.objects) == [deform]
     for chosen in ([control], [deform.children[0]], [control, deform], []):
         scene.softground.characters.clear()
         select(*chosen)

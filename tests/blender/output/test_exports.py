@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs
+from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground, ground_mesh, ground_surface
@@ -69,7 +69,7 @@ def assert_stands_as_recorded(ground, frame, world, tolerance=TOLERANCE):
 
 def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
-    exports.export_point_cache(scene, ground, path, *FRAMES)
+    exports.export_point_cache(ground, path, *FRAMES)
     start, samples = point_caches.read(path)
     assert (start, len(samples)) == (FRAMES[0], FRAMES[1] - FRAMES[0] + 1)
     for frame in (10, 25, 40):
@@ -86,7 +86,7 @@ def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapp
     assert options.frame_end == 72 * remapped[1] // remapped[0]
     jobs.run(bake_job.bake(scene))
     ground, frames = options.ground, (options.frame_start, options.frame_end)
-    exports.export_point_cache(scene, ground, tmp_path / "ground.pc2", *frames)
+    exports.export_point_cache(ground, tmp_path / "ground.pc2", *frames)
     for cached in (False, True):
         if cached:
             point_caches.play(ground, tmp_path / "ground.pc2", frames[0], remapped[0] / remapped[1])
@@ -99,7 +99,7 @@ def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapp
 
 def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
-    exports.export_point_cache(scene, ground, path, *FRAMES)
+    exports.export_point_cache(ground, path, *FRAMES)
     display_mesh = baked_ground.display_mesh_of(ground)
     native = {frame: played(display_mesh, frame) for frame in (25, 40)}
     point_caches.play(ground, path, FRAMES[0])
@@ -115,7 +115,7 @@ def import_and_select(operator, path, **options):
 
 def test_alembic_holds_the_moving_ground(scene, ground, tmp_path):
     path = tmp_path / "ground.abc"
-    exports.export_alembic(scene, ground, path, *FRAMES)
+    exports.export_alembic(ground, path, *FRAMES)
     copy = import_and_select(bpy.ops.wm.alembic_import, path, as_background_job=False)
     for frame in (12, 25, 40):
         assert_stands_as_recorded(ground, frame, played(copy, frame))
@@ -123,20 +123,20 @@ def test_alembic_holds_the_moving_ground(scene, ground, tmp_path):
 
 def test_usd_holds_the_moving_ground_and_its_shading(scene, ground, tmp_path):
     path = tmp_path / "ground.usdc"
-    exports.export_usd(scene, ground, path, *FRAMES)
+    exports.export_usd(ground, path, *FRAMES)
     copy = import_and_select(bpy.ops.wm.usd_import, path)
     for frame in (12, 25, 40):
         assert_stands_as_recorded(ground, frame, played(copy, frame))
     assert "softground_compression" in copy.data.attributes
 
 
-def write_and_read(kind, scene, ground, folder, start, end):
+def write_and_read(kind, ground, folder, start, end):
     """An object of what was written."""
     export, importer, options = {
         "abc": (exports.export_alembic, bpy.ops.wm.alembic_import, {"as_background_job": False}),
         "usdc": (exports.export_usd, bpy.ops.wm.usd_import, {}),
     }[kind]
-    export(scene, ground, folder / f"ground.{kind}", start, end)
+    export(ground, folder / f"ground.{kind}", start, end)
     return import_and_select(importer, folder / f"ground.{kind}", **options)
 
 
@@ -146,7 +146,7 @@ def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, g
     display_mesh = baked_ground.display_mesh_of(ground)
     finer = display_mesh.modifiers.new("Finer", "SUBSURF")
     finer.levels = finer.render_levels = 1
-    copy = write_and_read(kind, scene, ground, tmp_path, 37, 40)
+    copy = write_and_read(kind, ground, tmp_path, 37, 40)
     for frame in (37, 40):
         np.testing.assert_allclose(played(copy, frame), played(display_mesh, frame), atol=1e-5)
 
@@ -161,11 +161,11 @@ def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(sce
     scene.softground.frame_start, scene.softground.frame_end = -49, -20
     bpy.context.view_layer.update()
     jobs.run(bake_job.bake(scene))
-    copy = write_and_read("abc", scene, ground, tmp_path, -49, -20)
+    copy = write_and_read("abc", ground, tmp_path, -49, -20)
     for frame in (-40, -20):
         assert_stands_as_recorded(ground, frame, played(copy, frame))
     with pytest.raises(InputError, match=r"from frame 0 on, not from -49"):
-        exports.export_usd(scene, ground, tmp_path / "ground.usdc", -49, -20)
+        exports.export_usd(ground, tmp_path / "ground.usdc", -49, -20)
     assert [path.name for path in tmp_path.iterdir()] == ["ground.abc"]
 
 
@@ -176,9 +176,9 @@ def test_the_export_is_the_only_file_whatever_the_world_looks_like(scene, ground
     scene.world.use_nodes = True
     path = tmp_path / f"ground.{kind}"
     if kind == "obj":
-        exports.export_final(scene, ground, path)
+        exports.export_final(ground, path)
     else:
-        {"abc": exports.export_alembic, "usdc": exports.export_usd}[kind](scene, ground, path, *FRAMES)
+        {"abc": exports.export_alembic, "usdc": exports.export_usd}[kind](ground, path, *FRAMES)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -188,7 +188,7 @@ def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_pa
     bpy.context.view_layer.objects.active = scene.objects["Walker"]
     scene.objects["Walker"].select_set(True)
     frames = (scene.frame_start, scene.frame_end)
-    export(scene, ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
+    export(ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
     assert [thing.name for thing in bpy.context.selected_objects] == ["Walker"]
     assert bpy.context.view_layer.objects.active.name == "Walker"
     assert (scene.frame_start, scene.frame_end, scene.frame_current_final) == (*frames, 7.25)
@@ -203,7 +203,7 @@ def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, k
     display_mesh = baked_ground.display_mesh_of(ground)
     display_mesh.hide_set(True)
     display_mesh.hide_viewport = display_mesh.hide_render = True
-    export(scene, ground, tmp_path / f"ground.{kind}", 10, 12)
+    export(ground, tmp_path / f"ground.{kind}", 10, 12)
     assert (display_mesh.hide_get(), display_mesh.hide_viewport, display_mesh.hide_render) == (True, True, True)
     copy = import_and_select(read, tmp_path / f"ground.{kind}")
     assert len(copy.data.vertices) == len(display_mesh.data.vertices)
@@ -217,7 +217,7 @@ def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_wri
     hidden.objects.link(display_mesh)
     hidden.hide_viewport = True
     with pytest.raises(InputError, match=r"Trail' is hidden with its collection: show"):
-        exports.export_alembic(scene, ground, tmp_path / "ground.abc", 10, 12)
+        exports.export_alembic(ground, tmp_path / "ground.abc", 10, 12)
     assert not list(tmp_path.iterdir())
 
 
@@ -226,19 +226,19 @@ def test_the_final_mesh_of_a_hidden_ground_is_where_the_ground_is(scene, ground)
     display_mesh.hide_viewport = True
     display_mesh.location.x = 2.0
     bpy.context.view_layer.update()
-    assert exports.final_mesh(scene, ground).matrix_world.translation.x == pytest.approx(2.0)
+    assert exports.final_mesh(ground).matrix_world.translation.x == pytest.approx(2.0)
 
 
 def test_the_final_mesh_leaves_no_shape_keys_behind(scene, ground, tmp_path):
     keys = len(bpy.data.shape_keys)
-    exports.export_final(scene, ground, tmp_path / "ground.obj")
-    exports.final_mesh(scene, ground)
+    exports.export_final(ground, tmp_path / "ground.obj")
+    exports.final_mesh(ground)
     assert len(bpy.data.shape_keys) == keys
 
 
 def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):
     resolution = 512
-    paths = image_exports.export_images(scene, ground, tmp_path, 24, 25, resolution=resolution)
+    paths = image_exports.export_images(ground, tmp_path, 24, 25, units=settings.units_of(scene), resolution=resolution)
     assert sorted(path.name for path in paths) == [
         f"Field_{name}_{frame:04d}.exr" for name in ("displacement", "mask") for frame in (24, 25)
     ]
@@ -270,17 +270,17 @@ def scale_uv(ground, factor, shift):
 def test_images_are_refused_where_prints_would_be_missing(scene, ground, tmp_path, factor, shift, is_written):
     scale_uv(ground, factor, shift)
     if is_written:
-        image_exports.export_images(scene, ground, tmp_path, 40, 40, resolution=256)
+        image_exports.export_images(ground, tmp_path, 40, 40, units=settings.units_of(scene), resolution=256)
         assert read_image(tmp_path / "Field_displacement_0040.exr")[..., 0].min() < -0.03
         return
     with pytest.raises(InputError, match=r"Prints on ground 'Field' would be missing, as UV map 'UVMap'"):
-        image_exports.export_images(scene, ground, tmp_path, 40, 40, resolution=256)
+        image_exports.export_images(ground, tmp_path, 40, 40, units=settings.units_of(scene), resolution=256)
     assert not list(tmp_path.iterdir())
 
 
 def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground):
     display_mesh = baked_ground.display_mesh_of(ground)
-    still = exports.final_mesh(scene, ground)
+    still = exports.final_mesh(ground)
     assert not still.modifiers
     assert still.data.shape_keys is None
     assert not list(still.data.keys())
@@ -296,11 +296,11 @@ def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground
 def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
     ground = plane(scene)
     for export in (
-        lambda: exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2),
-        lambda: exports.export_alembic(scene, ground, tmp_path / "x.abc", 1, 2),
-        lambda: exports.export_usd(scene, ground, tmp_path / "x.usdc", 1, 2),
-        lambda: image_exports.export_images(scene, ground, tmp_path, 1, 2),
-        lambda: exports.final_mesh(scene, ground),
+        lambda: exports.export_point_cache(ground, tmp_path / "x.pc2", 1, 2),
+        lambda: exports.export_alembic(ground, tmp_path / "x.abc", 1, 2),
+        lambda: exports.export_usd(ground, tmp_path / "x.usdc", 1, 2),
+        lambda: image_exports.export_images(ground, tmp_path, 1, 2, units=settings.units_of(scene)),
+        lambda: exports.final_mesh(ground),
     ):
         with pytest.raises(InputError, match=r"no bake on ground 'Field'.*Bake Footprints"):
             export()
@@ -323,7 +323,7 @@ def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, t
     ground = scene.softground.ground
     assert played(baked_ground.display_mesh_of(ground), 60)[:, 2].min() < -0.01
     with pytest.raises(InputError, match=r"damaged|replaced"):
-        exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2)
+        exports.export_point_cache(ground, tmp_path / "x.pc2", 1, 2)
     bpy.ops.softground.clear_bake()
     assert not ground.hide_viewport
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, jobs
+from softground_addon.blender import compat, jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.output import image_exports
@@ -73,7 +73,9 @@ def shown(scene, frame):
 
 def write(scene, folder, frame, resolution=SIDE):
     ground = scene.softground.ground
-    paths = image_exports.export_images(scene, ground, folder, frame, frame, resolution=resolution)
+    paths = image_exports.export_images(
+        ground, folder, frame, frame, units=settings.units_of(scene), resolution=resolution
+    )
     return {path.stem.split("_")[1]: read_image(path)[..., :3] for path in paths}
 
 
@@ -152,7 +154,9 @@ def test_an_export_leaves_nothing_behind(opened, tmp_path):
         return {kind: {one.name for one in getattr(bpy.data, kind)} for kind in ("meshes", "objects", "scenes")}
 
     before = there()
-    image_exports.export_images(scene, scene.softground.ground, tmp_path, 30, 31, resolution=32)
+    image_exports.export_images(
+        scene.softground.ground, tmp_path, 30, 31, units=settings.units_of(scene), resolution=32
+    )
     assert there() == before
     assert len(list(tmp_path.glob("*_weather_*.exr"))) == 2
 

@@ -9,7 +9,7 @@ import pytest
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
-from softground_addon.blender import compat, mesh_arrays
+from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.node_modifiers import inputs_of
@@ -239,11 +239,11 @@ def test_plants_of_a_muted_step_stand_again_and_clear_lets_all_stand_until_the_n
     give_way(grass)
     shot.frame_set(48)
     lying, ground = angles(grass), shot.softground.ground
-    bake = step_edits.editable(shot)
-    step_edits.edit(shot, bake, {step_id(bake.left.footprints[1]): StepEdit(mute=True)})
+    bake = jobs.run(step_edits.reading(shot))
+    jobs.run(step_edits.editing(shot, bake, {step_id(bake.left.footprints[1]): StepEdit(mute=True)}))
     assert lying[0] > 60.0
     assert angles(grass)[0] < 20.0  # the foot may brush it on its way to the next step
-    step_edits.edit(shot, step_edits.editable(shot), {})
+    jobs.run(step_edits.editing(shot, jobs.run(step_edits.reading(shot)), {}))
     np.testing.assert_allclose(angles(grass), lying, atol=1e-3)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
     bpy.context.view_layer.update()

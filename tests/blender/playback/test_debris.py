@@ -15,7 +15,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
+from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.debris import debris_object, debris_shapes
@@ -188,18 +188,18 @@ def test_wind_and_amount_act_at_once(scene):
 def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     ground = scene.softground.ground
     before = fingerprints.of_mesh(debris_object.of(ground).data)
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     number = int(values(debris_object.of(ground), "step")[0])
-    step_edits.edit(scene, bake, {step_id(bake.left.footprints[number]): StepEdit(mute=True)})
+    jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[number]): StepEdit(mute=True)}))
     assert set(values(debris_object.of(ground), "step")) == set(bake.left.thrown) - {number}
-    step_edits.edit(scene, bake, {})
+    jobs.run(step_edits.editing(scene, bake, {}))
     assert fingerprints.of_mesh(debris_object.of(ground).data) == before
 
 
 def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     """Moved, deepened, scaled and shifted in time, muted, and a copy on an earlier print."""
     ground = scene.softground.ground
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     names = [step_id(one) for one in bake.left.footprints]
     edits = {
         names[0]: StepEdit(move_m=(0.3, 0.2), turn_deg=40.0),
@@ -209,7 +209,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
         f"{names[1]}+1": StepEdit(move_m=(0.05, 0.0), shift_frames=4),
     }
     before = values(debris_object.of(ground), "step")
-    step_edits.edit(scene, bake, edits)
+    jobs.run(step_edits.editing(scene, bake, edits))
     left = record.load(bytes(baked_ground.stored_record(ground)))
     edited, content = fingerprints.of_mesh(debris_object.of(ground).data), record.dump(replace(left, about={}))
     report = jobs.run(bake_job.bake(scene)).report
@@ -235,7 +235,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
 
 def test_no_piece_stays_where_a_print_is_dragged_away_from_under_it(scene):
     obj = debris_object.of(scene.softground.ground)
-    bake = step_edits.editable(scene)
+    bake = jobs.run(step_edits.reading(scene))
     step = bake.left.steps[1]
     before = fingerprints.of_mesh(obj.data)
     place, radius = places_of(obj)[:, :2], values(obj, "radius")
@@ -255,8 +255,8 @@ def test_no_piece_stays_where_a_print_is_dragged_away_from_under_it(scene):
 def test_debris_that_was_deleted_stays_away_from_edited_steps(scene):
     ground = scene.softground.ground
     bpy.data.objects.remove(debris_object.of(ground))
-    bake = step_edits.editable(scene)
-    step_edits.edit(scene, bake, {step_id(bake.left.footprints[0]): StepEdit(strength=0.5)})
+    bake = jobs.run(step_edits.reading(scene))
+    jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[0]): StepEdit(strength=0.5)}))
     assert debris_object.of(ground) is None
 
 
@@ -557,10 +557,12 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     corners[:] = (world[vertex, :2] - middle) / side + 0.5
     ground.data.uv_layers.new(name="Square").uv.foreach_set("vector", corners.ravel())
     scene.frame_set(5)
-    paths = image_exports.export_images(scene, ground, tmp_path, 20, 20, resolution=resolution, uv_map="Square")
+    paths = image_exports.export_images(
+        ground, tmp_path, 20, 20, units=settings.units_of(scene), resolution=resolution, uv_map="Square"
+    )
     for early in (1, 8):
         paths += image_exports.export_images(
-            scene, ground, tmp_path, early, early, resolution=resolution, uv_map="Square"
+            ground, tmp_path, early, early, units=settings.units_of(scene), resolution=resolution, uv_map="Square"
         )
     assert {path.stem.split("_")[-2] for path in paths} == {"displacement", "mask", "debris"}
     assert image_exports.kinds_of(ground) == ("displacement", "mask", "debris")
@@ -582,7 +584,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
             shown = (thickness.sum(axis=0) @ centre, thickness.sum(axis=1) @ centre) / thickness.sum()
             assert shown == pytest.approx(lies, abs=0.02)
     set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
-    blown = debris_object.at_rest(obj, frame_rate=24.0, time_stretch=1.0, unit_scale=1.0).place
+    blown = debris_object.at_rest(obj, settings.units_of(scene)).place
     there = wanted(obj, 1e4, (3, 0, 0))
     beside = (there[:, 2] < -5).sum()  # what fell beside the ground lies nowhere, and grains fall slowly
     assert len(there) - len(blown) == beside < 0.002 * len(there)
@@ -593,7 +595,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
 def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()
-    exports.export_usd(scene, ground, tmp_path / "shot.usda", 8, 20)
+    exports.export_usd(ground, tmp_path / "shot.usda", 8, 20)
     assert fingerprints.of_file() == before
     text = (tmp_path / "shot.usda").read_text(encoding="utf-8")
     has_clouds = compat.WRITES_CLOUDS
@@ -615,7 +617,7 @@ def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
 def test_alembic_carries_debris_as_points_with_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()
-    exports.export_alembic(scene, ground, tmp_path / "shot.abc", 8, 20)
+    exports.export_alembic(ground, tmp_path / "shot.abc", 8, 20)
     assert fingerprints.of_file() == before
     there = set(bpy.data.objects)
     bpy.ops.wm.alembic_import(filepath=str(tmp_path / "shot.abc"), as_background_job=False)

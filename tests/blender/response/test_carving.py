@@ -11,6 +11,7 @@ from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
 from softground_addon.core.carving import carves
+from softground_addon.core.errors import InputError
 from softground_addon.core.ground.sparse_grid import TILE, Window
 from softground_addon.core.pressing.repose import NEIGHBOURS
 from softground_addon.core.record import record
@@ -134,6 +135,15 @@ def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scen
     lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
     assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
     assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
+    waded = {row["step"]: row for row in report["events"] if row["phase"] == "wade"}
+    assert waded.keys() == {step_id(left.footprints[number]) for number in left.carves}
+    for number, carve in left.carves.items():
+        row, (low, high) = waded[step_id(left.footprints[number])], carve.window.corners(CELL)
+        assert carve.start_frame <= row["frame"] <= row["frame"] + 24 * row["duration_s"] <= carve.end_frame
+        assert row["time_s"] == pytest.approx((row["frame"] - 1) / 24, abs=1e-5)
+        assert (low < row["position"][:2]).all()
+        assert (row["position"][:2] < high).all()
+        assert row["surface"] == "snow"
     again = record.load(record.dump(left)).carves
     assert again.keys() == left.carves.keys()
     for number, carve in left.carves.items():
@@ -167,17 +177,64 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     muted = min(left.carves)
     name = step_id(left.footprints[muted])
     heights = recompose(left.shaping)
-    step_edits.edit(scene, step_edits.editable(scene), {name: StepEdit(mute=True)})
+    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
     without = baked_ground.record_of(scene.softground.ground)
     assert len(without.shaping) == len(left.shaping) - 2
     assert without.carves.keys() == left.carves.keys()
     wanted = settings.snapshot(scene)
     assert not staleness.reasons(scene, wanted)
     assert staleness.reasons(scene, replace(wanted, carve=False)) == ("The settings have changed",)
-    step_edits.edit(scene, step_edits.editable(scene), {})
+    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
     assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
+
+
+def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
+    walker(scene, **DEEP)
+    scene.softground.ground_margin = 2.0
+    _, left = bake(scene)
+    number, beside = min(left.carves), (0.0, 1.5)
+    step, carve = left.footprints[number], left.carves[number]
+    name = step_id(step)
+
+    def edited(edits):
+        step_edits.edit(scene, step_edits.editable(scene), edits)
+        return baked_ground.record_of(scene.softground.ground)
+
+    def lying(records, away=(0.0, 0.0)):
+        """Heights around the hole, or as far away from it."""
+        window = carve.window.expanded(5)
+        x, y = np.meshgrid(*window.centres(CELL))
+        compression, rim = recompose(records).nearest(x + away[0], y + away[1])
+        return rim - compression
+
+    moved = edited({name: StepEdit(move_m=beside)})
+    there = moved.laid_carves[number]
+    assert np.abs(lying([there], beside) - lying([carve])).max() < 1e-6
+    assert there.tile(there.rim).sum() == pytest.approx(carve.tile(carve.rim).sum(), rel=1e-6)
+    copied = edited({f"{name}+1": StepEdit(move_m=beside)})
+    assert np.array_equal(lying([copied.laid_carves[number + len(left.footprints)]], beside), lying([there], beside))
+    assert copied.laid_carves[number] is copied.carves[number]
+    edited({name: StepEdit(move_m=(0.0, 0.1), shift_frames=4)})
+    report, again = bake(scene)
+    assert again.carved_with == {name: StepEdit(move_m=(0.0, 0.1))}
+    assert again.laid_carves[number].start_frame == again.carves[number].start_frame + 4
+    assert report["totals"]["carved_m3"] == pytest.approx(
+        sum(c.compressed_m3 for c in again.carves.values()), rel=1e-12
+    )
+    at_bake, back = again.carves[number], edited({}).laid_carves[number]
+    before, after = (np.array(each.window[:2]) + np.array(each.window[2:]) / 2 for each in (at_bake, back))
+    assert (after - before) * CELL == pytest.approx([0.0, -0.1], abs=CELL)
+
+
+def test_a_bake_is_refused_that_carving_makes_too_long(scene, monkeypatch):
+    walker(scene, **DEEP)
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.CARVED", 1e6)
+    with pytest.raises(InputError, match=r"Legs carve deep ground\. .*Or turn Carve off"):
+        bake(scene)
+    scene.softground.material.youngs_modulus = 10e6
+    assert not bake(scene)[1].carves
 
 
 def test_a_bake_from_before_carving_is_still_current(scene):

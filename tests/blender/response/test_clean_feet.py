@@ -385,12 +385,12 @@ def test_legs_that_end_in_shins_are_keyed_by_their_bones_and_not_by_ik_that_cann
     legs = legs_on_shins(armature, [numbers["shin.L"], numbers["shin.R"]])
     mapping = RigMapping({"hips": (numbers["hips"], "head"), **legs})
     parts = {f"{part}_{side}" for part in ("thigh", "shank") for side in "lr"}
-    assert {control.part for control in controls_of(scene, armature, mapping)} == {"body", *parts}
+    assert {control.part for control in controls_of(scene.view_layers[0], armature, mapping)} == {"body", *parts}
     for side in "LR":
         ik = armature.pose.bones[numbers[f"shin.{side}"]].constraints.new("IK")
         ik.target, ik.subtarget, ik.chain_count = armature, numbers[f"hand.{side}"], 2
     bpy.context.view_layer.update()
-    assert {control.part for control in controls_of(scene, armature, mapping)} == {"body"}
+    assert {control.part for control in controls_of(scene.view_layers[0], armature, mapping)} == {"body"}
 
 
 RIGS = shots.SHARED / "rigs"

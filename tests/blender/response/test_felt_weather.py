@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat
+from softground_addon.blender import compat, jobs
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
@@ -91,9 +91,9 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     assert level.max() > 0.05
     assert np.mean(np.abs(lies[away, 2] - level) < 1e-3) > 0.95  # some lie at the tips of prints
     pieces = positions(obj.data)
-    bake = step_edits.editable(opened)  # an edit throws in the same weather
-    step_edits.edit(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)})
-    step_edits.edit(opened, bake, {})
+    bake = jobs.run(step_edits.reading(opened))  # an edit throws in the same weather
+    jobs.run(step_edits.editing(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(opened, bake, {}))
     assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
 
@@ -185,7 +185,7 @@ def test_an_edit_presses_again_in_the_weather_of_the_bake(opened):
     after = footprints(opened)
     opened.softground.steps_feel_weather = False
     set_to(opened, Snowfall=0.0)
-    bake = step_edits.editable(opened)
+    bake = jobs.run(step_edits.reading(opened))
     again = bake.with_edits({step_id(after[-1]): StepEdit(turn_deg=1e-9)})
     ((number, one),) = again.pressed_again.items()
     difference = recompose([one], cell_size=one.cell_size).read(one.window) - recompose([after[number]]).read(

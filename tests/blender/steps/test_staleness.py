@@ -460,7 +460,7 @@ def test_what_a_rigged_character_leans_on_is_compared_as_well(scene, change, mes
     cane = bpy.context.active_object
     cane.name = "Cane"
     rigs.key(cane, "location", {1: (0.3, 0, 0.45), 40: (0.3, 0, 0.45)})
-    add_object_contacts(scene, scene.softground.characters[0], [cane])
+    add_object_contacts(scene.softground, scene.softground.characters[0], [cane])
     bpy.ops.softground.bake()
     for frame in (1, 17, 40):
         scene.frame_set(frame)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from softground_addon.blender import session
+from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_report, step_edits, step_soles
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.ground import baked_ground, ground_mesh
@@ -54,14 +54,14 @@ def under(scene, place):
 
 def test_a_step_is_chosen_muted_changed_and_reset(baked):
     before, shown = stored(baked), heights(baked.softground.ground, DISPLAY_KEY)
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     assert bpy.ops.softground.choose_step(step=step.name) == {"FINISHED"}
     assert baked.frame_current == step.there_from >= step.baked.end_frame  # where its print is there
     assert session.current().step == step.name
     depth = under(baked, step.baked.position)
     assert depth > 0.01
     bpy.ops.softground.mute_step()
-    assert baked_steps.active(baked).left is None
+    assert baked_steps.chosen(baked.softground.ground)[0].left is None
     assert under(baked, step.baked.position) < 2e-3
     bpy.ops.softground.mute_step()
     assert stored(baked) == before
@@ -79,17 +79,21 @@ def test_a_step_is_chosen_muted_changed_and_reset(baked):
 
 def test_a_step_is_copied_changed_kept_by_a_bake_and_deleted(baked):
     before, shown = stored(baked), heights(baked.softground.ground, DISPLAY_KEY)
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     bpy.ops.softground.choose_step(step=step.name)
     bpy.ops.softground.duplicate_step()
-    copy = baked_steps.active(baked)
-    assert (copy.name, copy.is_copy, copy.number) == (f"{step.name}+1", True, len(baked_steps.of(baked)))
+    copy = baked_steps.chosen(baked.softground.ground)[0]
+    assert (copy.name, copy.is_copy, copy.number) == (
+        f"{step.name}+1",
+        True,
+        len(baked_steps.of(baked.softground.ground)),
+    )
     ahead = copy.left.position - step.baked.position
     assert 0.2 < np.linalg.norm(ahead[:2]) < 0.5
     assert ahead[1] == pytest.approx(-np.linalg.norm(ahead[:2]), abs=0.1)  # they walk along -y
     assert under(baked, copy.left.position) == pytest.approx(under(baked, step.baked.position), rel=0.3)
     bpy.ops.softground.change_step(move=(0.5, 0.0), scale=1.4, shift=5)
-    changed = baked_steps.active(baked)
+    changed = baked_steps.chosen(baked.softground.ground)[0]
     assert changed.frames == (step.frames[0] + 5, step.frames[1] + 5)
     assert changed.left.area_m2 == pytest.approx(1.4**2 * step.baked.area_m2, rel=0.05)
     edited, ground = stored(baked), baked.softground.ground
@@ -103,12 +107,12 @@ def test_a_step_is_copied_changed_kept_by_a_bake_and_deleted(baked):
 
 def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
     before = stored(baked)
-    step = baked_steps.of(baked)[1]
+    step = baked_steps.of(baked.softground.ground)[1]
     bpy.ops.softground.choose_step(step=step.name)
     baked.cursor.location = (0.35, -0.8, 0.3)
     baked.frame_set(33)
     bpy.ops.softground.add_step()
-    added = baked_steps.active(baked)
+    added = baked_steps.chosen(baked.softground.ground)[0]
     assert added.frames[0] == 33
     np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.02)
     assert under(baked, (0.35, -0.8)) > 0.01
@@ -121,17 +125,17 @@ def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
 
 def test_several_steps_are_chosen_and_changed_together_in_what_was_changed(baked):
     before = stored(baked)
-    one, two, three = baked_steps.of(baked)[:3]
+    one, two, three = baked_steps.of(baked.softground.ground)[:3]
     bpy.ops.softground.change_step(step=one.name, strength=0.5)
     bpy.ops.softground.choose_step(step=one.name)
     for step in (two, three, two):  # the last one no more
         bpy.ops.softground.choose_step(step=step.name, extend=True)
-    assert [step.name for step in baked_steps.chosen(baked)] == [three.name, one.name]
+    assert [step.name for step in baked_steps.chosen(baked.softground.ground)] == [three.name, one.name]
     bpy.ops.softground.change_step(scale=1.2)
     edits = baked_ground.edits_of(baked.softground.ground)
     assert edits == {one.name: StepEdit(strength=0.5, scale=1.2), three.name: StepEdit(scale=1.2)}
     bpy.ops.softground.mute_step()
-    assert [step.left is None for step in baked_steps.of(baked)[:3]] == [True, False, True]
+    assert [step.left is None for step in baked_steps.of(baked.softground.ground)[:3]] == [True, False, True]
     bpy.ops.softground.reset_step()
     assert stored(baked) == before
 
@@ -145,12 +149,16 @@ def choose(*steps):
 
 @pytest.mark.parametrize("copy_is_last", [True, False])
 def test_a_copy_that_is_deleted_leaves_the_others_selected(baked, copy_is_last):
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     bpy.ops.softground.duplicate_step(step=step.name)
-    copy = baked_steps.active(baked)
+    copy = baked_steps.chosen(baked.softground.ground)[0]
     choose(*((step, copy) if copy_is_last else (copy, step)))
     bpy.ops.softground.reset_step()
-    assert [one.name for one in baked_steps.chosen(baked)] == [baked_steps.active(baked).name] == [step.name]
+    assert (
+        [one.name for one in baked_steps.chosen(baked.softground.ground)]
+        == [baked_steps.chosen(baked.softground.ground)[0].name]
+        == [step.name]
+    )
     bpy.ops.softground.mute_step()
     assert baked_ground.edits_of(baked.softground.ground) == {step.name: StepEdit(mute=True)}
 
@@ -163,12 +171,12 @@ def test_nothing_selected_is_said_plainly(baked):
 
 
 def test_the_timeline_stays_while_a_step_is_taken_out_of_the_selection(baked):
-    one, two = baked_steps.of(baked)[:2]
+    one, two = baked_steps.of(baked.softground.ground)[:2]
     choose(one, two)
     baked.frame_set(22)
     for step, left in ((two, [one.name]), (one, [])):
         assert bpy.ops.softground.choose_step(step=step.name, extend=True) == {"FINISHED"}
-        assert ([step.name for step in baked_steps.chosen(baked)], baked.frame_current) == (left, 22)
+        assert ([step.name for step in baked_steps.chosen(baked.softground.ground)], baked.frame_current) == (left, 22)
     choose(one)
     assert baked.frame_current == one.there_from
     assert bpy.ops.softground.choose_step(step="gone", extend=True) == {"CANCELLED"}
@@ -176,7 +184,7 @@ def test_the_timeline_stays_while_a_step_is_taken_out_of_the_selection(baked):
 
 
 def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
-    step = baked_steps.of(baked)[1]
+    step = baked_steps.of(baked.softground.ground)[1]
     bpy.ops.softground.change_step(step=step.name, strength=1.3, move=(0.05, 0.07), turn=0.2)
     edited, ground = stored(baked), baked.softground.ground
     shown = heights(ground, DISPLAY_KEY)
@@ -192,7 +200,7 @@ def test_an_edit_keeps_the_look_that_the_bake_was_made_with(baked):
     options = baked.softground
     options.relief, options.cell_size = "FINE", 0.01
     bpy.ops.softground.bake()
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     bpy.ops.softground.mute_step(step=step.name)
     muted = heights(options.ground, DISPLAY_KEY)
     bpy.ops.softground.mute_step(step=step.name)
@@ -206,39 +214,39 @@ def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     ground = baked.softground.ground
     bpy.context.view_layer.update()
     before = fingerprints.of_file()
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     edits = {step.name: StepEdit(move_m=(0.0, 0.3))}
-    preview = StepPreview(ground, step_edits.editable(baked))
+    preview = StepPreview(ground, jobs.run(step_edits.reading(baked)))
     preview.show({step.name: StepEdit(move_m=(0.1, 0.2))})
     preview.show(edits)
     shown = heights(ground, DISPLAY_KEY)
     preview.end()
     assert fingerprints.of_file() == before
-    step_edits.edit(baked, step_edits.editable(baked), edits)
+    jobs.run(step_edits.editing(baked, jobs.run(step_edits.reading(baked)), edits))
     np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
 
 
 def test_a_step_takes_the_sole_of_another_foot(baked):
-    step = baked_steps.of(baked)[2]
+    step = baked_steps.of(baked.softground.ground)[2]
     ours = step.name.partition("@")[0]
     other = ours[:-1] + "LR"[step.side == "L"]
     before = step.outline()
     with pytest.raises(RuntimeError, match=f"no sole 'Fox/paw.L': choose one of .*{ours}"):
         bpy.ops.softground.change_step(step=step.name, sole="Fox/paw.L")
     bpy.ops.softground.change_step(step=step.name, sole=other)
-    changed = baked_steps.of(baked)[2]
+    changed = baked_steps.of(baked.softground.ground)[2]
     assert baked_ground.edits_of(baked.softground.ground) == {step.name: StepEdit(sole=other)}
     np.testing.assert_allclose(changed.outline().mean(axis=0), before.mean(axis=0), atol=0.02)
     assert np.abs(changed.outline()[:, None] - before).sum(axis=-1).min(axis=1).max() > 2e-3
     bpy.ops.softground.reset_step(step=step.name)
-    np.testing.assert_array_equal(baked_steps.of(baked)[2].outline(), before)
+    np.testing.assert_array_equal(baked_steps.of(baked.softground.ground)[2].outline(), before)
 
 
 def test_a_step_takes_the_sole_of_a_mesh(baked):
     before, shoe = stored(baked), plate(baked)
-    one, two = baked_steps.of(baked)[1:3]
+    one, two = baked_steps.of(baked.softground.ground)[1:3]
     bpy.ops.softground.change_step(step=one.name, sole="Shoe")
-    shod = baked_steps.of(baked)[1]
+    shod = baked_steps.of(baked.softground.ground)[1]
     assert np.ptp(shod.outline()[:, :2], axis=0) == pytest.approx((0.1, 0.4), abs=0.05)  # it walks along -y
     assert shod.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
     assert not bake_report.stale_reasons(baked)
@@ -249,10 +257,10 @@ def test_a_step_takes_the_sole_of_a_mesh(baked):
     bpy.context.view_layer.update()
     assert bake_report.stale_reasons(baked) == ("The mesh of 'Shoe', whose sole presses steps, has changed",)
     bpy.ops.softground.mute_step(step=two.name)
-    assert baked_steps.of(baked)[1].left.area_m2 == shod.left.area_m2
+    assert baked_steps.of(baked.softground.ground)[1].left.area_m2 == shod.left.area_m2
     assert bake_report.stale_reasons(baked)
     bpy.ops.softground.change_step(step=two.name, sole="Shoe")  # as it is now, also for the other step
-    assert baked_steps.of(baked)[1].left.area_m2 == pytest.approx(0.1 * 0.2, rel=0.25)
+    assert baked_steps.of(baked.softground.ground)[1].left.area_m2 == pytest.approx(0.1 * 0.2, rel=0.25)
     assert not bake_report.stale_reasons(baked)
     shoe.hide_set(True)
     shoe.hide_viewport = True
@@ -266,11 +274,11 @@ def test_a_step_takes_the_sole_of_a_mesh(baked):
 
 def test_a_step_is_added_in_the_sole_of_a_mesh(baked):
     plate(baked)
-    step = baked_steps.of(baked)[1]
+    step = baked_steps.of(baked.softground.ground)[1]
     bpy.ops.softground.choose_step(step=step.name)
     baked.cursor.location = (0.35, -0.8, 0.3)
     bpy.ops.softground.add_step(sole="Shoe")
-    added = baked_steps.active(baked)
+    added = baked_steps.chosen(baked.softground.ground)[0]
     assert (added.is_copy, added.edit.sole) == (True, "Shoe")
     assert added.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
     np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.03)
@@ -294,14 +302,16 @@ def test_soles_are_offered_by_name(baked):
     offered = step_editing._soles(None, bpy.context, "")
     assert offered[-2:] == ["Shoe", "Walker Figure"]
     assert baked.softground.ground.name not in offered
-    assert set(baked_steps.of(baked)[0].feet) < set(offered)
+    assert set(baked_steps.of(baked.softground.ground)[0].feet) < set(offered)
     assert step_editing._soles(None, bpy.context, "shO") == ["Shoe"]
     with pytest.raises(RuntimeError, match="is the ground and cannot print on itself"):
-        bpy.ops.softground.change_step(step=baked_steps.of(baked)[1].name, sole=baked.softground.ground.name)
+        bpy.ops.softground.change_step(
+            step=baked_steps.of(baked.softground.ground)[1].name, sole=baked.softground.ground.name
+        )
 
 
 def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
-    steps = baked_steps.of(baked)
+    steps = baked_steps.of(baked.softground.ground)
     assert [step.number for step in steps] == list(range(1, len(steps) + 1))
     assert {step.side for step in steps} == {"L", "R"}
     bpy.ops.softground.choose_step(step=steps[-1].name)
@@ -325,13 +335,13 @@ def reset_button(scene):
 
 
 def test_reset_is_enabled_while_any_selected_step_is_edited(baked):
-    one, two = baked_steps.of(baked)[:2]
+    one, two = baked_steps.of(baked.softground.ground)[:2]
     choose(one, two)
     assert not reset_button(baked)[0]
     bpy.ops.softground.mute_step(step=one.name)
     assert reset_button(baked) == (True, "LOOP_BACK")
     bpy.ops.softground.duplicate_step(step=two.name)
-    copy = baked_steps.active(baked)
+    copy = baked_steps.chosen(baked.softground.ground)[0]
     choose(copy, two)
     assert reset_button(baked) == (True, "TRASH")
 
@@ -384,7 +394,7 @@ def test_many_steps_are_pressed_again_when_they_are_dropped(baked, drag, monkeyp
     monkeypatch.setattr(time, "thread_time", itertools.count(0.0, seconds).__next__)
     presses, show = [], StepPreview.show
     monkeypatch.setattr(StepPreview, "show", lambda *arguments: presses.append(show(*arguments)))
-    steps = baked_steps.of(baked)[:count]
+    steps = baked_steps.of(baked.softground.ground)[:count]
     choose(*steps)
     place = steps[0].outline().mean(axis=0)
     drag.press(place)
@@ -398,7 +408,7 @@ def test_many_steps_are_pressed_again_when_they_are_dropped(baked, drag, monkeyp
 
 
 def test_a_box_may_end_over_the_sidebar(baked, drag):
-    steps = baked_steps.of(baked)
+    steps = baked_steps.of(baked.softground.ground)
     choose(steps[0])
     drag.press((-9.0, -9.0))
     for place in ((0.0, 0.0), (9.5, 9.9)):
@@ -422,7 +432,7 @@ def test_a_step_that_is_none_is_named(baked):
 
 def test_without_a_bake_there_is_no_step_to_change(scene):
     shots.walker(scene, frames=30)
-    assert not baked_steps.of(scene)
+    assert not baked_steps.of(scene.softground.ground)
     for name in ("choose_step", "mute_step", "change_step", "reset_step", "reset_steps", "drag_step"):
         assert not getattr(bpy.ops.softground, name).poll()
     assert ground_mesh.RECORD

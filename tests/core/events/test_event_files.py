@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from softground_addon.core.events import event_edl, event_json, event_midi, event_otio, event_reaper
+from softground_addon.core.events import event_files, event_midi
 from softground_addon.core.events.events import COLUMNS
 
 RATE = 24.0
@@ -31,7 +31,7 @@ LANDINGS = [row for row in EVENTS if row["phase"] in ("heel_strike", "land")]
 
 
 def test_json_lines_hold_every_column_and_say_in_what_it_is():
-    head, *rows = map(json.loads, event_json.dump(EVENTS, frame_rate=RATE).splitlines())
+    head, *rows = map(json.loads, event_files.json_lines(EVENTS, frame_rate=RATE).splitlines())
     assert rows == EVENTS
     assert set(head["columns"]) == set(EVENTS[0])
 
@@ -107,7 +107,7 @@ def test_midi_is_as_its_standard_says():
 
 
 def test_reaper_reads_regions_and_markers():
-    text = event_reaper.dump(EVENTS)
+    text = event_files.reaper(EVENTS)
     assert not text.startswith("\ufeff")
     rows = list(csv.DictReader(io.StringIO(text)))
     assert list(rows[0]) == ["#", "Name", "Start", "End", "Length"]
@@ -118,7 +118,7 @@ def test_reaper_reads_regions_and_markers():
 
 
 def test_resolve_reads_one_marker_at_each_frame():
-    lines = event_edl.dump(EVENTS, frame_rate=RATE).splitlines()
+    lines = event_files.edl(EVENTS, frame_rate=RATE).splitlines()
     assert lines[:2] == ["TITLE: SoftGround", "FCM: NON-DROP FRAME"]
     cut = re.compile(r"(\d{3})  001      V     C        (\S{11}) (\S{11}) (\S{11}) (\S{11})  ")
     cuts = [found for line in lines if (found := cut.fullmatch(line))]
@@ -133,7 +133,7 @@ def test_resolve_reads_one_marker_at_each_frame():
 
 def test_opentimelineio_reads_markers_with_all_that_is_known():
     otio = pytest.importorskip("opentimelineio")
-    timeline = otio.adapters.read_from_string(event_otio.dump(EVENTS, frame_rate=RATE), "otio_json")
+    timeline = otio.adapters.read_from_string(event_files.otio(EVENTS, frame_rate=RATE), "otio_json")
     markers = timeline.tracks[0].markers
     assert [one.name for one in markers][:2] == ["Ina foot.L heel strike", "Ina foot.L foot flat"]
     for row, one in zip(EVENTS, markers, strict=True):
@@ -143,7 +143,7 @@ def test_opentimelineio_reads_markers_with_all_that_is_known():
 
 
 def test_opentimelineio_is_in_schemas_of_its_first_versions():
-    timeline = json.loads(event_otio.dump(EVENTS, frame_rate=RATE))
+    timeline = json.loads(event_files.otio(EVENTS, frame_rate=RATE))
     assert timeline["OTIO_SCHEMA"] == "Timeline.1"
     (track,) = timeline["tracks"]["children"]
     assert (track["OTIO_SCHEMA"], track["kind"]) == ("Track.1", "Audio")
@@ -154,6 +154,6 @@ def test_opentimelineio_is_in_schemas_of_its_first_versions():
 
 def test_no_events_are_files_too():
     assert event_midi.dump([]).endswith(b"\xff\x2f\x00")
-    assert event_reaper.dump([]) == "#,Name,Start,End,Length\n"
-    for module in (event_json, event_edl, event_otio):
-        assert module.dump([], frame_rate=RATE)
+    assert event_files.reaper([]) == "#,Name,Start,End,Length\n"
+    for dump in (event_files.json_lines, event_files.edl, event_files.otio):
+        assert dump([], frame_rate=RATE)

@@ -1,5 +1,7 @@
 """What takes the slide out of a contact: planted points stay, feet roll and turn on purpose as before."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,12 +18,13 @@ def sole(pose):
     rest = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=-1)
     turn, place = pose
     points = rest @ np.swapaxes(turn, -1, -2) + place[:, None]
-    return Underside(points, points[..., 2] - points[..., 2].min(), np.zeros(len(rest), int), LENGTH)
+    heights = points[..., 2] - points[..., 2].min()
+    return Underside(points, heights, np.zeros(len(rest), int), LENGTH, rest[:, 0] / LENGTH)
 
 
 def locked(rim, touching):
     points = carried(lock(rim, touching)[:, None], rim.points)
-    return Underside(points, rim.heights, rim.piece, rim.length)
+    return replace(rim, points=points)
 
 
 def level(angle):
@@ -67,6 +70,22 @@ def test_a_foot_that_turns_on_purpose_keeps_its_turn_and_does_not_slide_away():
     assert slides(locked(rim, TOUCHING), TOUCHING).max() < 1e-6
 
 
+@pytest.mark.parametrize("pivot", [0.0, LENGTH], ids=["heel", "toes"])
+@pytest.mark.parametrize("angle", [30.0, 80.0])
+def test_a_foot_that_turns_on_its_heel_or_toes_and_skates_stays_where_these_first_stood(angle, pivot):
+    angles = np.radians(angle) * PART**2
+    about = pivot - pivot * np.cos(angles), -pivot * np.sin(angles)
+    rim = sole((level(angles), np.stack([about[0] + 0.03 * PART, about[1], 0 * PART], axis=-1)))
+    end = rim.along == pivot / LENGTH
+
+    def farthest(points):
+        middle = points[:, end, :2].mean(axis=1)
+        return np.linalg.norm(middle - middle[0], axis=1).max()
+
+    assert farthest(rim.points) > 0.025
+    assert farthest(locked(rim, TOUCHING).points) < 0.01
+
+
 def test_between_contacts_the_correction_passes_smoothly_from_one_to_the_next():
     touching = (PART < 0.3) | (PART > 0.7)
     rim = sole((level(0 * PART), np.stack([0.1 * PART, 0 * PART, 0 * PART], axis=-1)))
@@ -91,5 +110,5 @@ def test_a_sole_that_rolls_over_a_rounded_toe_does_not_creep(frames):
     rest = np.concatenate([part + np.array((0.0, y, 0.0)) for part in (flat, toe) for y in (-0.04, 0.04)])
     points = rest @ np.swapaxes(turn, -1, -2)
     heights = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-    rolling = Underside(points, heights, np.zeros(len(rest), int), LENGTH)
+    rolling = Underside(points, heights, np.zeros(len(rest), int), LENGTH, rest[:, 0] / LENGTH)
     assert slides(locked(rolling, touching), touching).max() < 3e-4

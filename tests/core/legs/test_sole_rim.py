@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from softground_addon.core.legs.foot_lock import Underside, lock, slides, turned_level
 from softground_addon.core.legs.foot_placement import posed_points
-from softground_addon.core.legs.sole_rim import posed_rim, rim, rim_pieces
+from softground_addon.core.legs.sole_rim import along, posed_rim, rim, rim_pieces
 from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.numerics.rigid import carried, displacement, rotation
 from tests.core.walkers import foot_sole, pose
@@ -68,7 +68,7 @@ def test_a_sole_that_bends_up_at_both_ends_slides_less_than_rigid_pieces_would(s
     touching, worst = np.ones(FRAMES, bool), []
     for points in (posed_rim(motion), posed_points(motion, rim(sole))):
         heights = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-        under = Underside(points, heights, rim_pieces(sole), sole.length)
+        under = Underside(points, heights, rim_pieces(sole), sole.length, along(sole))
         held = carried(lock(under, touching)[:, None], points)
         worst.append(slides(replace(under, points=held), touching).max())
     assert worst[0] < 1e-3
@@ -92,7 +92,9 @@ def test_no_other_level_way_of_a_bending_sole_would_slide_less(sole, toes):
     """Against a general least-squares solver."""
     motion, touching = rolling(sole, toes), np.ones(FRAMES, bool)
     points = posed_rim(motion)
-    under = Underside(points, points[..., 2] - points[..., 2].min(axis=1, keepdims=True), rim_pieces(sole), sole.length)
+    under = Underside(
+        points, points[..., 2] - points[..., 2].min(axis=1, keepdims=True), rim_pieces(sole), sole.length, along(sole)
+    )
     held = replace(under, points=carried(lock(under, touching)[:, None], points))
     still = np.zeros(3 * FRAMES)
     best = least_squares(lambda placement: planted_slides(under, placement).ravel(), still, max_nfev=30)

@@ -6,8 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.playback.ramps import QUANTUM, TOLERANCE
-from softground_addon.core.playback.vertex_histories import SHADING_TOLERANCE, vertex_histories
+from softground_addon.core.playback.vertex_histories import CARVED_TOLERANCE, SHADING_TOLERANCE, vertex_histories
+from softground_addon.core.record.footprints import FootprintRecorder, quantised
 from softground_addon.core.record.pressed_ground import PressedGround
 from tests.core.walkers import box_sole, loads_of, pose, pressed, standing, walk
 
@@ -120,3 +122,31 @@ def test_untouched_places_have_no_history():
 def test_a_bake_without_footprints_has_no_history():
     result = vertex_histories([], np.zeros(3), np.zeros(3), blur_sigma=0.005)
     assert result.movement.at(5.0, 3).tolist() == [[0.0, 0.0]] * 3
+
+
+def test_carved_ground_is_at_rest_once_it_hardly_moves_any_more():
+    carve, window = FootprintRecorder(0.01, 1.0), Window(0, 0, 12, 9)
+    for frame, (cut, loose) in {10: (0.1, 0.01), 14: (0.1, 0.0), 30: (0.0, 0.002), 45: (0.001, -0.001)}.items():
+        change = quantised(np.stack([np.full((9, 12), cut), np.full((9, 12), loose)]))
+        carve.add(float(frame), window, change, np.zeros((9, 12), bool))
+    nothing = np.zeros(0)
+    footprint = carve.footprint(
+        **{
+            "character": "",
+            "sole": "",
+            "start_frame": 10.0,
+            "end_frame": 45.0,
+            "position": np.zeros(3),
+            "heading": 0.0,
+        },
+        **dict.fromkeys(("area_m2", "peak_force_n", "compressed_m3", "rim_m3", "unplaced_rim_m3"), 0.0),
+        **{"load_frames": nothing, "load_n": nothing},
+    )
+    x, y = np.random.default_rng(0).uniform((-0.02, -0.02), (0.14, 0.11), (300, 2)).T
+    height, compression, error = largest_difference([footprint], SNOW, np.arange(8.0, 50.0, 0.5), x, y)
+    assert height <= error * 1.001 <= CARVED_TOLERANCE * 1.001
+    assert compression <= CARVED_TOLERANCE
+    movement = vertex_histories([footprint], x, y, blur_sigma=SNOW.blur_sigma).movement
+    assert movement.end.max() == 14.0
+    shown_last, last = movement.at(50.0, len(x)).T, shown([footprint], 50.0, SNOW, x, y)
+    assert shown_last == pytest.approx(np.array([last.display, last.compression]), abs=2 * QUANTUM)

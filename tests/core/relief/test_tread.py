@@ -34,7 +34,7 @@ def pressed_in(values, *, mirrored=False, spacing=0.0025):
     step = steps_on("wet_sand")[0]
     shape = shape_of(step, MATERIALS["wet_sand"].blur_sigma)
     of_sole = tread_map.from_text(tread_map.as_text(tread_map.from_picture(values)))
-    plain = Amounts(10.0, tread=Tread(HEIGHT, kept=0.0, lost=0.0))
+    plain = Amounts(10.0, tread=Tread(HEIGHT, least_lost=0.0, lost=0.0))
     tread = SoleTread(of_map(of_sole), mirrored)
     more = {"blur_sigma": MATERIALS["wet_sand"].blur_sigma, "finest": spacing, "seed": 1}
     with_it = relief_of_print(step, plain, tread=tread, **more)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.legs.foot_placement import between_contacts
 from softground_addon.core.legs.grounding import leg_of, leg_soles, reach_of, responding
 from softground_addon.core.motion.sole_motion import SoleMotion
 from softground_addon.core.numerics.intervals import runs
@@ -55,6 +56,18 @@ def test_hips_shake_no_more_than_in_the_source_while_feet_stand_and_legs_reach(s
     for side, sole in leg_soles(motion).items():
         reach = reach_of(leg_of(motion, side, sole))
         assert (leg_of(after, side, sole).span < reach + 2e-3)[touching[:, sole]].all()
+
+
+def test_feet_that_turn_as_they_stand_do_not_shake_the_hips():
+    motion, touching = skating(0, 1.2)
+    turned = np.zeros((2, *motion.hips.shape))
+    for number, turn in enumerate(turned):
+        for first, end in zip(*runs(touching[:, number]), strict=True):
+            turn[first:end, 2] = np.radians(40.0) * np.linspace(0.0, 1.0, end - first) ** 2
+        turn[:, 2] = between_contacts(turn[:, 2], touching[:, number])
+    turning = moved(motion, 0 * motion.hips, *turned)
+    after = responding(turning, clean(turning, touching, FLOOR))
+    assert jerk(after.hips) < 1.1 * jerk(motion.hips)
 
 
 def floating(motion, touching):

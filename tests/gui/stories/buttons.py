@@ -40,7 +40,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
             yield from press(hand, name, facts["pressed"][name])
     steps = module("operators.baked_steps")
     for name in EDITING:
-        session().step = steps.of(scene())[0].name
+        session().step = steps.of(scene().softground.ground)[0].name
         facts["pressed"][name] = []
         yield from press(hand, name, facts["pressed"][name])
     facts["edited"] = len(module("ground.baked_ground").edits_of(scene().softground.ground))

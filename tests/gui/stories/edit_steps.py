@@ -168,7 +168,7 @@ def strength_of(name: str) -> float:
 
 
 def steps() -> Any:
-    return module("operators.baked_steps").of(scene())
+    return module("operators.baked_steps").of(scene().softground.ground)
 
 
 def edits() -> dict:

@@ -103,7 +103,7 @@ def prints_in_view(hand: Hand) -> list[tuple[float, float, float]]:
     window, view = hand.region("WINDOW"), hand.area().spaces.active.region_3d
     steps = module("operators.baked_steps")
     found = []
-    for step in steps.of(scene()):
+    for step in steps.of(scene().softground.ground):
         corners = [location_3d_to_region_2d(window, view, point) for point in step.outline().tolist()]
         if step.there_from <= scene().frame_current and all(corners):
             across, up = (np.array(side) for side in zip(*corners, strict=True))
