@@ -12,7 +12,8 @@ from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.presets import Preset
 from ..core.motion.sole_motion import shortest_length
-from .ground_slots import LENGTHS, user_folder
+from .ground_slots import LENGTHS
+from .preset_files import user_folder
 from .settings import ADD_ON, MATERIAL_FIELDS, material_of, typed
 
 SMALL_SOLE = 0.1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -12,55 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import InputError
-from ..core.ground import presets
+from ..core.ground.surfaces import SURFACES
 from ..core.settings import RegionSettings
-from .state import state
+from .preset_files import named
 
 HARD = "none"
 """In `Material.softground_preset`, in place of the file name of a preset: a floor that bears and does not give way."""
 ATTRIBUTE = "softground_region"
 """Integer attribute on faces: number of the slot whose preset counts instead of the face's own; less than 0 is none."""
+MARK = "softground_surface"
+"""Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
 OVER = "softground_over"
 """Custom property of the add-on's copies of the user's materials, with the material that they are of."""
 LENGTHS = ("rim_reach", "blur_sigma")
 """Fields of a material that go with the soles."""
-
-USER_FOLDER = "presets/softground"
-"""Where the user's presets are, below the folder of Blender's user scripts."""
-
-
-def user_folder() -> Path:
-    """Folder of the user's presets, which may not be there yet."""
-    return Path(bpy.utils.user_resource("SCRIPTS", path=USER_FOLDER))
-
-
-def loaded(path: Path) -> presets.Preset:
-    """The preset in a file, read again only where it was written since."""
-    written = path.stat().st_mtime_ns
-    if path not in state.presets or state.presets[path][0] != written:
-        state.presets[path] = written, presets.load(path)
-    preset: presets.Preset = state.presets[path][1]
-    return preset
-
-
-def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
-    """The presets of a folder by name, and what is wrong with the files that are none."""
-    entries, broken = [], []
-    for path in sorted(folder.glob("*.json")):
-        try:
-            entries.append((path, loaded(path)))
-        except InputError as error:
-            broken.append(str(error))
-    return sorted(entries, key=lambda entry: entry[1].name.casefold()), broken
-
-
-def named(name: str) -> presets.Preset:
-    """The preset of that file name; errors as of `presets.find`."""
-    for folder in (presets.FOLDER, user_folder()):
-        path = folder / f"{name}.json"
-        if path.parent == folder and path.is_file():
-            return loaded(path)
-    return presets.find(name, (presets.FOLDER, user_folder()))
 
 
 def theirs(material: bpy.types.Material | None) -> Any:
@@ -91,6 +55,42 @@ def title_of(material: bpy.types.Material | None) -> str:
         return named(name).name
     except InputError:
         return f"? {name}"
+
+
+def choose(ground: bpy.types.Object | None, slot: int | str, preset: str) -> None:
+    """Have the material of a slot of a ground name a preset.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object or None
+    slot : int or str
+        Its number, or the name of its material.
+    preset : str
+        Name of its file, `HARD`, or nothing for what the rest of the ground is made of.
+
+    Raises
+    ------
+    InputError
+        If there is no such slot, it has no material of the user's that can be changed, or there is no such preset.
+    """
+    materials = [theirs(one.material) for one in ground.material_slots] if ground else []
+    number = next((n for n, one in enumerate(materials) if one and one.name == slot), slot)
+    if ground is None or number not in range(len(materials)):
+        there = ", ".join(repr(one.name) for one in materials if one)
+        raise InputError(f"The ground has no such material slot, {slot!r}: choose one of its materials ({there}).")
+    material = materials[int(number)]
+    if material is None:
+        raise InputError(f"Slot {int(number) + 1} of '{ground.name}' has no material: give it one first.")
+    if material.library or material.override_library:
+        raise InputError(f"Material '{material.name}' is linked from another file: make it local, and choose then.")
+    if material.get(MARK) in SURFACES:
+        raise InputError(
+            f"Material '{material.name}' goes with the preset of the ground: choose that one, or give the slot a "
+            "material of your own."
+        )
+    if preset not in ("", HARD):
+        named(preset)
+    material.softground_preset = preset
 
 
 def regions_of(ground: bpy.types.Object, length_scale: float = 1.0) -> tuple[RegionSettings, ...]:

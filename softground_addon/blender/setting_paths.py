@@ -8,6 +8,10 @@ from typing import Any
 import bpy
 
 from ..core.errors import InputError
+from . import ground_slots
+
+SLOTS = "slots"
+"""Begin of a path to the preset of a material slot of the ground, by its number or the name of its material."""
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\]")
 
@@ -44,7 +48,8 @@ def _takes(field: Any, value: Any) -> bool:
 
 
 def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:
-    """Set one setting by its path below `scene.softground`, e.g. `characters[0].mass` to `80`.
+    """Set one setting by its path below `scene.softground`, e.g. `characters[0].mass` to `80`, or the preset of a
+    material of the ground, e.g. `slots["Rock"]` to `none`.
 
     Raises
     ------
@@ -53,6 +58,9 @@ def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:
     """
     owner: Any = settings
     steps = _parse(path)
+    if steps[0] == SLOTS and len(steps) == 2:
+        ground_slots.choose(settings.ground, steps[1], text)
+        return
     for step in steps[:-1]:
         owner = _descend(owner, step, path)
     name = steps[-1]

@@ -25,8 +25,8 @@ from ...core.record.edits import StepEdit, from_json
 from .. import ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
-from ..ground_slots import user_folder
 from ..output import export_formats
+from ..preset_files import user_folder
 from ..response import response_job
 from . import cli_arguments, program
 from .saving import check_places, files_read, save_copy, save_target

@@ -49,6 +49,8 @@ def hard_fault(obj: bpy.types.Object) -> str:
 
 def check_usable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
+    if (of := trail_detail.ground_of(ground)) != ground:
+        raise InputError(f"'{ground.name}' shows the prints of ground '{of.name}': choose '{of.name}' in Ground.")
     detail = trail_detail.detail_of(ground)
     for obj in filter(None, (ground, detail)):
         check_writable(obj)

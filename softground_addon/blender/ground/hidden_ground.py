@@ -28,28 +28,36 @@ def may_hide(ground: bpy.types.Object) -> bool:
 
 
 def hide(ground: bpy.types.Object) -> None:
-    """Hide the ground; where particles or instances are on it, its mesh only. Nothing happens where it is hidden."""
-    if hides(ground):
-        return
-    before = [getattr(ground, name) for name in _SHOWN]
+    """Hide the ground; where particles or instances are on it, its mesh only: what came onto a hidden one is shown."""
+    is_hidden = hides(ground)
+    before = _before(ground)
     scattered: dict[frozenset[str], bool] = {}  # by the modifiers that are shown, which mostly are the same in both
-    for kind in ("viewport", "render"):
+    for number, kind in enumerate(("viewport", "render")):
+        if is_hidden and (before[number] or not getattr(ground, f"hide_{kind}")):
+            continue
         shown = frozenset(modifier.name for modifier in ground.modifiers if getattr(modifier, f"show_{kind}"))
         if shown not in scattered:
             scattered[shown] = _is_scattered_on(ground, shown)
         if scattered[shown]:
             setattr(ground, f"show_instancer_for_{kind}", False)
-        else:
-            setattr(ground, f"hide_{kind}", True)
+        if is_hidden or not scattered[shown]:
+            setattr(ground, f"hide_{kind}", not scattered[shown])
     ground[WAS_HIDDEN] = before
+
+
+def _before(ground: bpy.types.Object) -> list[Any]:
+    """What of `_SHOWN` is set of a ground that is shown, or was of one that is hidden."""
+    if not hides(ground):
+        return [getattr(ground, name) for name in _SHOWN]
+    before: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
+    return before if len(before) == len(_SHOWN) else list(_BY_DEFAULT)
 
 
 def show_again(ground: bpy.types.Object) -> None:
     """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
     if not hides(ground):
         return
-    before: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
-    for name, value in zip(_SHOWN, before if len(before) == len(_SHOWN) else _BY_DEFAULT, strict=True):
+    for name, value in zip(_SHOWN, _before(ground), strict=True):
         setattr(ground, name, bool(value))
     del ground[WAS_HIDDEN]
 
@@ -62,6 +70,7 @@ def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
         return False
     with ground_surface.stand_in(ground, ground_mesh.mesh_of(ground)) as evaluated:
         copy = evaluated.original
+        copy.hide_viewport = False
         for modifier in copy.modifiers:
             modifier.show_viewport = modifier.name in shown
         layer = copy.users_scene[0].view_layers[0]

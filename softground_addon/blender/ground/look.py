@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 
 from ...core.ground.surfaces import SURFACES
-from ..ground_slots import HARD, OVER, surface_of, theirs
-from ..materials.materials import MARK, ensure_material, ensure_over
+from ..ground_slots import HARD, MARK, OVER, surface_of, theirs
+from ..materials.materials import ensure_material, ensure_over
 from .baked_ground import display_mesh_of
 
 

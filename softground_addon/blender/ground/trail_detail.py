@@ -40,6 +40,12 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     return detail if stands_in else None
 
 
+def ground_of(shown: bpy.types.Object) -> bpy.types.Object:
+    """The ground that a copy takes the prints of; any other object is what it is."""
+    ground = shown.get(DETAIL_OF)
+    return ground if isinstance(ground, bpy.types.Object) and detail_of(ground) == shown else shown
+
+
 def was_deleted(ground: bpy.types.Object) -> bool:
     """True if the copy that takes the prints of a ground was deleted in the viewport."""
     return hides(ground) and not exists(ground.get(DETAIL))
@@ -113,6 +119,7 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
     if detail is not None:
         _exchange(detail, draft)
         ground[DETAIL] = detail
+        hide(ground)
         return detail
     _forget_deleted(ground)
     ground[DETAIL], draft[DETAIL_OF] = draft, ground

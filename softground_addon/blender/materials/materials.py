@@ -17,7 +17,7 @@ from ...core.ground import surfaces
 from ...core.ground.surfaces import SurfaceRecord
 from ..compat import shader_tree
 from ..drafts import none_left_if_it_fails
-from ..ground_slots import OVER
+from ..ground_slots import MARK, OVER
 from ..playback.own_data import COMPRESSION, RIM, SOLE
 from ..playback.weather_nodes import FRESH
 from ..shader_graph import Graph, Socket
@@ -27,9 +27,6 @@ from .weather_look import bare, under_weather
 
 TREAD_PITCH = 0.017
 """From bar to bar of a tread [m]."""
-
-MARK = "softground_surface"
-"""Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
 
 EDGE = "ground_edge"
 """Float attribute of a mesh that lets the add-on's materials fade out, as it goes from 0 to 1."""

@@ -8,13 +8,11 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
-from ...core.errors import InputError
 from ...core.ground import presets
-from ...core.ground.surfaces import SURFACES
-from .. import settings
-from ..ground_slots import HARD, listed, theirs, user_folder
-from ..materials.materials import MARK
+from .. import ground_slots, settings
+from ..ground_slots import HARD
 from ..operator_base import reports_errors
+from ..preset_files import listed, user_folder
 from ..state import state
 
 AS_GROUND = "AS_GROUND"
@@ -52,19 +50,9 @@ class SOFTGROUND_OT_region_preset(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         ground = settings.options_of(context).ground
-        if not settings.exists(ground) or self.slot >= len(ground.material_slots):
-            raise InputError("The ground has no such material slot: choose a ground with materials.")
-        material = theirs(ground.material_slots[self.slot].material)
-        if material is None:
-            raise InputError(f"Slot {self.slot + 1} of '{ground.name}' has no material: give it one first.")
-        if material.library or material.override_library:
-            raise InputError(f"Material '{material.name}' is linked from another file: make it local, and choose then.")
-        if material.get(MARK) in SURFACES:
-            raise InputError(
-                f"Material '{material.name}' goes with the preset of the ground: choose that one, or give the slot a "
-                "material of your own."
-            )
-        material.softground_preset = "" if self.preset == AS_GROUND else self.preset
+        ground_slots.choose(
+            ground if settings.exists(ground) else None, self.slot, "" if self.preset == AS_GROUND else self.preset
+        )
         return {"FINISHED"}
 
 

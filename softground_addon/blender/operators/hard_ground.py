@@ -7,7 +7,7 @@ from bpy.props import StringProperty
 
 from ...core.errors import InputError
 from .. import settings
-from ..ground import ground_checks
+from ..ground import ground_checks, trail_detail
 from ..operator_base import reports_errors
 from ..translation import translated
 from .panel_base import chosen_of, remove_chosen
@@ -32,7 +32,8 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
         if self.object:
             chosen = [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
-        chosen = [obj for obj in chosen if obj != options.ground and obj not in settings.hard_grounds_of(options)]
+        taken = [options.ground, *settings.hard_grounds_of(options)]
+        chosen = [obj for obj in chosen if trail_detail.ground_of(obj) not in taken]
         if not chosen:
             raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")
         for obj in chosen:

@@ -18,7 +18,7 @@ from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
-from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look
+from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
 from ..operator_base import reports_errors
 from ..reading import analysis, shots
 from ..response import response_job
@@ -197,7 +197,10 @@ def _check_no_instance(context: bpy.types.Context) -> None:
 
 
 def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object if it is a selected mesh that no character wears or carries and that does not print itself."""
+    """The active object if it is a selected mesh that no character wears or carries and that does not print itself.
+
+    Of a copy that takes the prints of a ground, that ground.
+    """
     obj = context.active_object
     if obj is None or obj.type != "MESH" or not obj.select_get() or obj.find_armature():
         return None
@@ -206,7 +209,33 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     belongs = any(
         character.armature in above or any(sole.object == obj for sole in character.soles) for character in characters
     )
-    return None if belongs else obj
+    return None if belongs else trail_detail.ground_of(obj)
+
+
+class SOFTGROUND_OT_select_shown(bpy.types.Operator):
+    """Select the copy of the ground that takes the prints, with their playback and weather in its modifiers"""
+
+    bl_idname = "softground.select_shown"
+    bl_label = "Select What Shows the Prints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether a copy of the ground shows the prints, and objects can be selected."""
+        ground = settings.options_of(context).ground
+        cls.poll_message_set(translated("The ground shows its prints itself"))
+        if ground is None or trail_detail.detail_of(ground) is None:
+            return False
+        cls.poll_message_set(translated("Switch to Object Mode first"))
+        return context.mode == "OBJECT"
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        shown = baked_ground.display_mesh_of(settings.options_of(context).ground)
+        if shown.name not in context.view_layer.objects or not shown.visible_get():
+            raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
+        created_ground.select(settings.scene_of(context), shown)
+        return {"FINISHED"}
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
@@ -320,6 +349,7 @@ CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_use_as_ground,
     SOFTGROUND_OT_create_ground,
+    SOFTGROUND_OT_select_shown,
     SOFTGROUND_OT_clear_bake,
     SOFTGROUND_OT_apply_look,
     SOFTGROUND_OT_copy_bake_command,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,6 @@ from ...core.errors import InputError
 from ...core.events import sound, wave_file
 from ...core.events.sound import SoundStep
 from ...core.files import files
-from ...core.record.footprints import Footprint
 from .. import settings
 from ..ground import baked_ground
 
@@ -52,7 +51,7 @@ def write(
     recordings = _recordings(samples, path) if samples else []
     steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
     if stereo:
-        steps = _seen_by_camera(scene, steps, footprints)
+        steps = _seen_by_camera(scene, steps)
     heard = sound.footsteps(steps, (end - start + 1) / rate, recordings)
     with files.replacing(path) as partial:
         partial.write_bytes(wave_file.dump(heard))
@@ -72,9 +71,7 @@ def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:
     return [(path.name, wave_file.read(path)) for path in paths]
 
 
-def _seen_by_camera(
-    scene: bpy.types.Scene, steps: Sequence[SoundStep], footprints: Mapping[str, Footprint]
-) -> list[SoundStep]:
+def _seen_by_camera(scene: bpy.types.Scene, steps: Sequence[SoundStep]) -> list[SoundStep]:
     """The steps with the gains of two channels: to the side where the camera sees them, softer the farther they are."""
     camera = scene.camera
     if camera is None:
@@ -87,9 +84,8 @@ def _seen_by_camera(
     seen = []
     try:
         for step in steps:
-            footprint = footprints[step.name]
-            scene.frame_set(int(footprint.start_frame))
-            place = camera.matrix_world.inverted() @ Vector((footprint.position / unit).tolist())
+            scene.frame_set(int(step.frame))
+            place = camera.matrix_world.inverted() @ Vector((step.position / unit).tolist())
             seen.append((place.x, max(place.length, 1e-6)))
     finally:
         scene.frame_set(frame, subframe=subframe)

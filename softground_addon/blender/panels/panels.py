@@ -14,7 +14,7 @@ from .. import session, settings
 from ..characters import selection
 from ..characters.character_setup import title_of
 from ..characters.import_fixes import is_captured, stature_of
-from ..ground import baked_ground, ground_mesh, still_ground
+from ..ground import baked_ground, ground_mesh, still_ground, trail_detail
 from ..live import live
 from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
@@ -219,6 +219,9 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         options = scene.softground
         layout.prop(options, "ground", text="")
+        if options.ground is not None and (shown := trail_detail.detail_of(options.ground)):
+            text = translated("Shown by {name}", name=shown.name)
+            layout.operator("softground.select_shown", text=text, icon="RESTRICT_SELECT_OFF", translate=False)
         row = layout.row(align=True)
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")

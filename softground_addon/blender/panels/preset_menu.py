@@ -15,9 +15,9 @@ from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, jobs, settings
 from ..characters.character_setup import characters_of, title_of
-from ..ground_slots import listed, loaded, user_folder
 from ..operator_base import OnShot, reports_errors
 from ..operators.modal_job import ReadingShot, Reports
+from ..preset_files import listed, loaded, user_folder
 from ..reading import analysis
 from ..translation import CONTEXT, translated
 from . import preset_icons

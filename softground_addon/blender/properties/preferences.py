@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...core.ground import presets
-from ..ground_slots import user_folder
+from ..preset_files import user_folder
 from ..settings import ADD_ON
 
 

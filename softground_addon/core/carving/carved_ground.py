@@ -19,7 +19,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import REACH, CarvedCells, Walls
+from .carver import REACH, CarvedCells
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -79,21 +79,18 @@ def _numbered(triangles: Indices, count: int) -> tuple[Indices, Indices]:
 class CarvedGround:
     """The ground of a shot as it is carved."""
 
-    def __init__(
-        self, ground: SoftGround, walls: Walls, cell_size: float, steps: Sequence[CarvedStep], rate: float
-    ) -> None:
-        self._walls, self._cell_size = walls, cell_size
+    def __init__(self, ground: SoftGround, cell_size: float, steps: Sequence[CarvedStep], rate: float) -> None:
+        self._ground, self._cell_size = ground, cell_size
         self._coming = sorted(steps, key=lambda step: step.begins, reverse=True)
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
         self._slides_every, self._frames_to_rest = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
-        self._again = 1.0 - (1.0 - walls.packing) ** (1.0 / (PUSHED * rate))
+        self._frames_to_push = PUSHED * rate
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
         self._highest = 0.0
         """Highest surface over the undisturbed ground so far [m]."""
-        self._layer_depth = ground.material.layer_depth
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._cells = SampledGrid(self._untouched, cell_size, channels=8)
         """Terrain, its openness, the layer's floor, T, K, loose matter; what is recorded of the cut and of this."""
@@ -106,8 +103,8 @@ class CarvedGround:
         window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
         surface = self._undisturbed.surface(window)
         terrain, nothing = np.nan_to_num(surface.heights), np.zeros(x.shape)
-        depth = self._layer_depth * (self._variation.factors(window).depth if self._variation else 1.0)
-        bottom = terrain - depth
+        depth = self._ground.layer_depths(window, self._cell_size)
+        bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
         return np.stack([terrain, surface.bears, bottom, terrain, nothing + np.inf, nothing, nothing, nothing])
 
     def press(self, since: float, frame: float) -> None:
@@ -166,12 +163,13 @@ class CarvedGround:
 
     def carve(self, part: Drawn, parts: Sequence[Drawn], frame: float) -> None:
         """Cut the ground to one of the parts that are drawn of bodies."""
-        window = part.window
+        window, walls = part.window, part.step.walls
         cells, channels = self._read(window)
         bodies = _lowest(parts, window)
-        cells.cut(np.maximum(part.underside, channels[2]), part.way, self._walls.packing, bodies, again=self._again)
+        again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
+        cells.cut(np.maximum(part.underside, channels[2]), part.way, walls.packing, bodies, again=again)
         if round(frame) % self._slides_every == 0:
-            cells.slide(self._walls, bodies < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
+            cells.slide(walls, bodies < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
         self._write(part.step, window, cells, channels, frame)
 
     def leave(self, step: CarvedStep) -> None:
@@ -181,17 +179,17 @@ class CarvedGround:
 
     def settle(self, parts: Sequence[Drawn], frame: float) -> None:
         """Let what steps have carved slide on around the parts of bodies; at the end, all of it is recorded."""
-        holds = self._walls.strength > 0
-        sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
         for step, frames in list(self._settling.items()):
+            holds = step.walls.strength > 0
+            sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
             cells, _ = self._read(window)
-            window = window.expanded(self._walls.reach(cells.surface, cells.loose, self._cell_size))
+            window = window.expanded(step.walls.reach(cells.surface, cells.loose, self._cell_size))
             cells, channels = self._read(window)
             if not holds and frames == self._frames_to_rest:
                 cells.gather(channels[7] * QUANTUM, THIN)  # then its edges slide as well
             body = _lowest(parts, window) < cells.surface + self._cell_size
-            cells.slide(self._walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
+            cells.slide(step.walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
             if holds and frames == 1:
                 cells.gather(channels[7] * QUANTUM, THIN)
             if frames == 1:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
 from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder
+from .carver import Walls
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,6 +28,7 @@ class CarvedStep:
     footprint: Footprint
     is_deep: bool
     recorder: FootprintRecorder
+    walls: Walls
     cut: float = 0.0
     packed: float = 0.0
     unplaced: float = 0.0

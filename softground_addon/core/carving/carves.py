@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.regions import GroundKind
 from ..ground.soft_ground import SoftGround
 from ..ground.surfaces import find
 from ..legs.grounding import Response
@@ -62,8 +63,7 @@ def with_carves(
     ]
     if not responded:
         return left
-    walls = Walls.of(find(surface), ground.material, ground.gravity)
-    carves = yield from carves_of.slices(responded, prints, ground, walls, len(left.footprints))
+    carves = yield from carves_of.slices(responded, prints, ground, surface, len(left.footprints))
     where = {name: replace(placement(edit), shift_frames=0) for name, edit in left.edits.items()}
     return replace(left, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
 
@@ -80,7 +80,7 @@ def carves_of(
     skins: Sequence[tuple[str, Sequence[str], RespondedSkin]],
     footprints: Mapping[int, Footprint],
     ground: SoftGround,
-    walls: Walls,
+    surface: str,
     count: int,
 ) -> Slices[dict[int, Footprint]]:
     """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
@@ -91,16 +91,23 @@ def carves_of(
         Name of each character, the names of its soles, and its skin; at least one, all at the same frames.
     footprints : mapping of int to Footprint
         The prints that the ground is made from, at least one, by their numbers.
+    surface : str
+        What it is made of, but for its regions: walls are those of the region that bears most of a step.
     count : int
         Of the steps that bodies take; those of higher numbers are copies.
     """
     first = next(iter(footprints.values()))
     steps = {
-        number: CarvedStep(footprint, is_deep(footprint), FootprintRecorder(first.cell_size, first.frame_step))
+        number: CarvedStep(
+            footprint,
+            is_deep(footprint),
+            FootprintRecorder(first.cell_size, first.frame_step),
+            _walls(footprint, ground, surface),
+        )
         for number, footprint in footprints.items()
     }
     frames = skins[0][2].frames
-    carving = CarvedGround(ground, walls, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
+    carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
     bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
@@ -123,6 +130,19 @@ def carves_of(
         yield
         carving.finish(step, float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+
+
+def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
+    """How the ground stands that a step is in: of the kind with the largest part of its contact."""
+    kind = GroundKind(surface, ground.material)
+    if ground.regions:
+        window = footprint.window
+        numbers, shares = ground.regions.under(window, window, footprint.cell_size)
+        parts = (
+            np.ones(1) if shares is None else shares.reshape(len(shares), -1)[:, footprint.contact_cells].sum(axis=1)
+        )
+        kind = ground.regions.kinds[numbers[int(parts.argmax())]]
+    return Walls.of(find(kind.surface), kind.material, ground.gravity)
 
 
 class _Body:

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (docs/model.md section 4)."""
+DEPTH_TOLERANCE = float(np.finfo(np.float32).eps)
+"""Rounding of a depth, as the ground is kept in 32-bit floats."""
 
 
 def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: Array | None = None) -> None:
@@ -42,7 +44,7 @@ def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: 
                 f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
             )
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
-        if footprint.max_depth_m > (deepest * depth.max() + fallen) * (1 + 1e-9):
+        if footprint.max_depth_m > (deepest * depth.max() + fallen) * (1 + DEPTH_TOLERANCE):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
                 "was written. Please report this as a bug."

@@ -50,7 +50,7 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
     """
     throws: list[Throw] = []
     for character in loads:
-        of_character = phases.phases(character)
+        of_character = [phase for phase in phases.phases(character) if not phase.hard]
         sliding = np.zeros(character.contacts.touching.shape, bool)
         for phase in of_character:
             if phase.kind == "slide_start":

@@ -60,7 +60,9 @@ def velocity(peak_bw: float) -> int:
 
 def note(event: Event) -> int:
     """Of an event's surface and foot."""
-    return surfaces.find(event["surface"]).midi_note + {"L": 0, "R": 1}.get(event["side"], 2)
+    on = event["surface"]
+    of_surface = surfaces.HARD_NOTE if on == surfaces.HARD else surfaces.find(on).midi_note
+    return of_surface + {"L": 0, "R": 1}.get(event["side"], 2)
 
 
 def _messages(event: Event, channel: int) -> Iterable[_Message]:

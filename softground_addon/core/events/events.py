@@ -25,11 +25,11 @@ COLUMNS = {
     "character": "who",
     "contact": "with what, such as foot.L",
     "phase": "heel_strike, foot_flat, heel_off, toe_off, slide_start, slide_end, scuff, land or wade",
-    "step": "id of the step in the report; empty of a scuff, and where nothing was pressed",
+    "step": "id of the step in the report; empty of a scuff, on hard ground, and where nothing was pressed",
     "side": "L, R or empty",
     "position": "of the lowest point of the sole [m]",
     "normal": "of the ground",
-    "surface": "what the ground is made of",
+    "surface": "what the ground is made of; hard where it takes no print",
     "peak_force_n": "largest normal force of the phase",
     "peak_bw": "the same in body weights",
     "impulse_ns": "of the normal force over the phase",
@@ -168,7 +168,7 @@ def _row(
     length = over_time.until(phase) - phase.moment if landing else phase.last - phase.first
     frames = motion.frames[phase.first], motion.frames[min(phase.last, len(motion.frames)) - 1]
     step, depth, area, its_surface = steps.at(motion.name, sole.name, *frames)
-    if phase.kind == "scuff":
+    if phase.kind == "scuff" or phase.hard:
         step, depth, area = "", 0.0, 0.0
     peak = float(force.max(initial=0.0))
     return {
@@ -181,7 +181,7 @@ def _row(
         "side": sole.side,
         "position": [_rounded(value, 5) for value in phases.place_of(loads, phase.sole, at)],
         "normal": [_rounded(value, 5) for value in loads.contacts.normal[at, phase.sole]],
-        "surface": its_surface or surface,
+        "surface": surfaces.HARD if phase.hard else its_surface or surface,
         "peak_force_n": _rounded(peak, 2),
         "peak_bw": _rounded(peak / (motion.mass * motion.gravity), 4),
         "impulse_ns": _rounded(float(force.sum()) * motion.time_step, 3),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -57,6 +57,8 @@ class Phase:
         When it happens, in steps and their fractions.
     first, last : int
         Steps of the phase, from first to before last.
+    hard : bool
+        True of a contact with hard ground, which takes no print.
     """
 
     kind: Kind
@@ -65,6 +67,7 @@ class Phase:
     moment: float
     first: int
     last: int
+    hard: bool = False
 
 
 def phases(loads: CharacterLoads) -> list[Phase]:
@@ -72,10 +75,8 @@ def phases(loads: CharacterLoads) -> list[Phase]:
 
     A contact that has begun before the loads has no landing, and one that goes on after them no leaving.
     """
-    touching = loads.contacts.touching
-    unsorted = [
-        phase for sole in range(touching.shape[1]) for phase in (*_of_contacts(loads, sole), *_of_scuffs(loads, sole))
-    ]
+    soles = range(len(loads.motion.soles))
+    unsorted = [phase for sole in soles for phase in (*_of_contacts(loads, sole), *_of_scuffs(loads, sole))]
     return sorted(unsorted, key=lambda phase: (phase.moment, phase.sole))
 
 
@@ -160,7 +161,7 @@ def _velocities(loads: CharacterLoads, sole: int) -> Array:
 
 
 def _of_contacts(loads: CharacterLoads, sole: int) -> Iterator[Phase]:
-    touching = loads.contacts.touching[:, sole]
+    touching, hard = loads.contacts.standing[:, sole], loads.contacts.hard
     speed, force = slide_speed(loads, sole), normal_force(loads, sole)
     least = LOADED * loads.motion.mass * loads.motion.gravity
     for touched, lifted in zip(*(ends.tolist() for ends in runs(touching)), strict=True):
@@ -168,16 +169,17 @@ def _of_contacts(loads: CharacterLoads, sole: int) -> Iterator[Phase]:
         if not len(loaded):
             continue
         begin, stop = int(loaded[0]), int(loaded[-1]) + 1
-        landed, leaves = begin > 0, stop < len(touching)
+        landed, leaves, on_hard = begin > 0, stop < len(touching), hard is not None and bool(hard[begin, sole])
         marks = [(begin, _landing(loads, sole, begin))] if landed else []
         if is_foot(loads.motion.soles[sole]):
             marks += _rolling(loads, sole, begin, stop)
         ends = [*(at for at, _ in marks[1:]), stop]
         for (at, kind), end in zip(marks, ends, strict=False):
-            yield Phase(kind, sole, at, _crossing(force, at, least) if at == begin else at, at, end)
+            yield Phase(kind, sole, at, _crossing(force, at, least) if at == begin else at, at, end, on_hard)
         if leaves:
-            yield Phase("toe_off", sole, stop, _crossing(force, stop, least), marks[-1][0] if marks else begin, stop)
-        yield from _slides(loads, sole, speed, begin, stop)
+            lifted_at = _crossing(force, stop, least)
+            yield Phase("toe_off", sole, stop, lifted_at, marks[-1][0] if marks else begin, stop, on_hard)
+        yield from (replace(slide, hard=on_hard) for slide in _slides(loads, sole, speed, begin, stop))
 
 
 def _crossing(force: Array, step: int, level: float) -> float:
@@ -190,7 +192,7 @@ def _landing(loads: CharacterLoads, sole: int, begin: int) -> Kind:
     """Kind of a contact's begin: a foot that walks or runs strikes; both feet out of a jump, and all else, land."""
     if not is_foot(loads.motion.soles[sole]):
         return "land"
-    touching, scale = loads.contacts.touching, loads.motion.time_scale / loads.motion.time_step
+    touching, scale = loads.contacts.standing, loads.motion.time_scale / loads.motion.time_step
     near, flight = round(TOGETHER * scale), round(FLIGHT * scale)
     others = np.delete(touching, sole, axis=1)
     start = max(0, begin - near)
@@ -238,8 +240,9 @@ def _of_scuffs(loads: CharacterLoads, sole: int) -> Iterator[Phase]:
     clearance, speed = loads.contacts.clearance[:, sole], slide_speed(loads, sole)
     apart = round(SCUFF_APART * motion.time_scale / motion.time_step)
     low = clearance < SCUFF_HEIGHT * motion.leg_length
-    low &= ~loads.contacts.touching[:, sole] & (speed > SCUFF_SPEED * motion.froude_speed)
-    for first, last in zip(*(ends.tolist() for ends in runs(~loads.contacts.touching[:, sole])), strict=True):
+    swinging = ~loads.contacts.standing[:, sole]
+    low &= swinging & (speed > SCUFF_SPEED * motion.froude_speed)
+    for first, last in zip(*(ends.tolist() for ends in runs(swinging)), strict=True):
         inner = slice(first + apart, max(first + apart, last - apart))
         for begin, stop in zip(*(ends.tolist() for ends in runs(low[inner])), strict=True):
             span = inner.start + begin, inner.start + stop

@@ -2,13 +2,14 @@
 
 What a step compacts crackles: a Poisson process of micro-impacts, at the rate at which the record says that ground gave
 way. What slides hisses as the force changes. The heel thumps on what it has packed, and mud pops as the foot leaves.
+On a hard floor, heel and ball click as they come down.
 See `core.ground.surfaces` for the sources.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,12 @@ FULL_POP = 0.05
 """Depth of mud that pops as loud as it gets [m]."""
 TAIL = 0.1
 """Ringing after a foot has left [s]."""
+CLICK = 0.006
+"""Time within which a heel or a ball meets a hard floor [s]."""
+CLICKS = {"heel_strike": 3.0, "land": 3.0, "foot_flat": 1.0}
+"""Phases that click on a hard floor, by their shares of its energy."""
+SPACING = 0.002
+"""Between samples of a force that is known by its peaks [s]."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +75,8 @@ class SoundStep:
         Start and end [s] of volumes that give way [m³].
     depth : float
         Of its print [m].
+    frame, position
+        Scene frame and place [m] at which it begins.
     gains : tuple of float
         Of each channel.
     """
@@ -80,6 +89,8 @@ class SoundStep:
     force: Array
     compacted: Array
     depth: float
+    frame: float
+    position: Array
     gains: tuple[float, ...] = (1.0,)
 
 
@@ -99,7 +110,7 @@ def steps_of(
     """
     struck = {row["step"]: row for row in table if row["phase"] in LANDINGS}
     lifted = {row["step"]: row for row in table if row["phase"] == "toe_off"}
-    surface = table[0]["surface"] if table else surfaces.DEFAULT
+    surface = next((row["surface"] for row in table if row["surface"] != surfaces.HARD), surfaces.DEFAULT)
 
     def seconds(frames: Array | float) -> Array:
         return (np.asarray(frames, float) - first_frame) / frame_rate
@@ -114,8 +125,40 @@ def steps_of(
         compacted = np.stack([seconds(ends - step.frame_step), seconds(ends), volumes], axis=1)
         time, force = seconds(step.load_frames), np.asarray(step.load_n, float)
         marks = moment(struck.get(name)), moment(lifted.get(name))
-        heard.append(SoundStep(name, step.surface or surface, *marks, time, force, compacted, step.max_depth_m))
-    return heard
+        place = step.start_frame, step.position
+        heard.append(SoundStep(name, step.surface or surface, *marks, time, force, compacted, step.max_depth_m, *place))
+    return [*heard, *(_on_hard(rows, frame_rate, first_frame) for rows in _hard_contacts(table))]
+
+
+def _hard_contacts(table: Sequence[Event]) -> Iterator[list[Event]]:
+    """The phases of each contact with a hard floor, from its landing on."""
+    of_soles: dict[tuple[str, str], list[list[Event]]] = {}
+    for row in table:
+        contacts = of_soles.setdefault((row["character"], row["contact"]), [])
+        if row["surface"] != surfaces.HARD or row["phase"] in (*LANDINGS, "scuff"):
+            contacts.append([])  # no phase after this is of the contact before it
+        if contacts and row["surface"] == surfaces.HARD and row["phase"] != "scuff":
+            contacts[-1].append(row)
+    for contacts in of_soles.values():
+        yield from (rows for rows in contacts if rows and rows[0]["phase"] in LANDINGS)
+
+
+def _on_hard(rows: Sequence[Event], frame_rate: float, first_frame: float) -> SoundStep:
+    """The sound of a contact with a hard floor, whose force is known by its peak in each phase."""
+    first = rows[0]
+    start = (first["frame"] - first_frame) / frame_rate
+    end = start + max(first["duration_s"], 2 * CLICK)
+    phases = [row for row in rows if row["phase"] in ("foot_flat", "heel_off")]
+    begins = np.array([start, *((row["frame"] - first_frame) / frame_rate for row in phases), end])
+    peaks = [row["peak_force_n"] for row in (first, *phases)]
+    middles = (begins[:-1] + begins[1:]) / 2
+    time = np.arange(start, end + SPACING, SPACING)
+    force = np.interp(time, [start, *middles, end], [0.0, *peaks, 0.0])
+    energy = [CLICKS.get(row["phase"], 0.0) for row in (first, *phases)]
+    clicks = np.stack([begins[:-1], begins[:-1] + CLICK, energy], axis=1)
+    lifted = next((end for row in rows if row["phase"] == "toe_off"), None)
+    name, place = f"{first['character']}/{first['contact']}@{first['frame']}", np.array(first["position"])
+    return SoundStep(name, surfaces.HARD, start, lifted, time, force, clicks, 0.0, first["frame"], place)
 
 
 def footsteps(steps: Sequence[SoundStep], seconds: float, recordings: Sequence[tuple[str, Array]] = ()) -> Array:
@@ -150,7 +193,7 @@ def step_sound(step: SoundStep) -> tuple[int, Array]:
     begin = step.time[0] if step.struck is None else step.struck
     end = max(float(step.time[-1]), step.lifted or 0.0, begin) + TAIL
     clock = begin + np.arange(round((end - begin) * RATE)) / RATE
-    voice, random = surfaces.find(step.surface).voice, _random(step)
+    voice, random = voice_of(step.surface), _random(step)
     heard = np.zeros(len(clock))
     if voice.crackle:
         heard += voice.crackle * _crackle(step, voice, random, begin, len(clock))
@@ -160,6 +203,11 @@ def step_sound(step: SoundStep) -> tuple[int, Array]:
     if voice.pop and step.lifted is not None:
         heard += voice.pop * _pop(step, random, clock - step.lifted)
     return round(begin * RATE), LOUDNESS * heard
+
+
+def voice_of(surface: str) -> Voice:
+    """How a surface sounds, or a hard floor."""
+    return surfaces.HARD_VOICE if surface == surfaces.HARD else surfaces.find(surface).voice
 
 
 def loudness(step: SoundStep) -> float:

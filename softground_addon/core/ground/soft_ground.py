@@ -101,3 +101,11 @@ class SoftGround:
         if self.regions is None:
             return [self.material]
         return [self.regions.kinds[number].material for number in self.regions.under(window, window, cell_size)[0]]
+
+    def layer_depths(self, window: Window, cell_size: float) -> Array | float:
+        """Depth of the loose layer in the cells of a window, (rows, columns) or of all of them [m]."""
+        if self.regions is None:
+            return self.material.layer_depth
+        numbers, shares = self.regions.under(window, window, cell_size)
+        depths = np.array([self.regions.kinds[number].material.layer_depth for number in numbers])
+        return float(depths[0]) if shares is None else np.asarray(np.tensordot(depths, shares, 1))

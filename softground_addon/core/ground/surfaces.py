@@ -309,6 +309,13 @@ SURFACES = {record.name: record for record in (
 )}  # fmt: skip
 """Surfaces by name, in the order in which the user sees them."""
 
+HARD = "hard"
+"""In place of a surface: a floor that bears and takes no print, such as rock, stone tiles, a deck."""
+HARD_VOICE = Voice(1.0, 0.15, 0.5, 0.0, (350, 2600), (0.002, 0.009), 0.0, 1.5, (1500, 6000), (90, 160))
+"""Sound of a shoe on it: most of the power of such steps lies below 2.5 kHz and within 30 ms of the strike (by ear)."""
+HARD_NOTE = 56
+"""As `SurfaceRecord.midi_note`."""
+
 
 LIQUIDS = {
     liquid.name: liquid

@@ -1,10 +1,14 @@
 """Grounds as artists have them: with physics, scatter and constraints, overhead, and under edit."""
 
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
 import bpy
 import pytest
 
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.panels import panels
 from tests.blender import fingerprints
 from tests.blender.grounds import as_rendered, field, mover, node_group, refusal
 
@@ -109,6 +113,59 @@ def test_what_is_scattered_on_a_ground_stays_while_a_copy_of_it_takes_the_prints
     bpy.context.view_layer.update()
     assert shown(ground) == (True, stones)
     assert ground.show_instancer_for_render
+
+
+@pytest.mark.parametrize("scatter", [scatter_by_nodes, scatter_by_particles])
+def test_what_is_scattered_on_a_ground_after_a_bake_is_seen_from_the_next_on(short_walk, scatter):
+    ground = field(short_walk)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    scatter(ground)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    mesh_is_shown, stones = shown(ground)
+    assert (mesh_is_shown, ground.hide_render, ground.show_instancer_for_render) == (False, False, False)
+    assert stones > 20
+    ground.hide_viewport = True  # by the user
+    ground.modifiers.clear()
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert not ground.hide_viewport
+    assert not ground.hide_render
+    assert ground.show_instancer_for_viewport
+    assert ground.show_instancer_for_render
+
+
+def test_a_ground_that_the_user_shows_again_stays_shown(short_walk):
+    ground = field(short_walk)
+    bpy.ops.softground.bake()
+    ground.hide_viewport = False
+    bpy.ops.softground.bake()
+    assert (ground.hide_viewport, ground.hide_render) == (False, True)
+
+
+def test_the_copy_that_shows_the_prints_is_selected_by_a_button_and_is_no_ground_of_its_own(short_walk):
+    ground = field(short_walk)
+    ground.select_set(True)
+    assert not bpy.ops.softground.select_shown.poll()
+    bpy.ops.softground.bake()
+    copy = baked_ground.display_mesh_of(ground)
+    bpy.context.view_layer.objects.active = next(obj for obj in short_walk.objects if obj.type == "ARMATURE")
+    copy.select_set(False)
+    assert bpy.ops.softground.select_shown() == {"FINISHED"}
+    assert bpy.context.selected_objects == [copy]
+    assert bpy.context.active_object == copy
+    layout = MagicMock()
+    panels.SOFTGROUND_PT_ground.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
+    assert any(call.kwargs.get("text") == "Shown by Field Trail" for call in layout.operator.call_args_list)
+    assert bpy.ops.softground.use_as_ground() == {"FINISHED"}
+    assert short_walk.softground.ground == ground
+    with pytest.raises(RuntimeError, match="Select meshes to stand on, other than the ground"):
+        bpy.ops.softground.add_hard_ground()
+    short_walk.softground.ground = copy
+    with pytest.raises(RuntimeError, match="'Field Trail' shows the prints of ground 'Field': choose 'Field'"):
+        bpy.ops.softground.bake()
+    short_walk.softground.ground = ground
+    copy.hide_set(True)
+    with pytest.raises(RuntimeError, match="'Field Trail' is hidden"):
+        bpy.ops.softground.select_shown()
 
 
 def test_a_scatter_that_renders_only_is_in_the_way_in_no_viewport(short_walk):

@@ -8,13 +8,16 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_slots, jobs, settings
+from softground_addon.blender import ground_slots, jobs, setting_paths, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.materials.materials import MARK, OVER
+from softground_addon.blender.output import sound_exports
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
+from softground_addon.core.errors import InputError
+from softground_addon.core.events import wave_file
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.regions import MOST
 from softground_addon.core.record import record
@@ -92,6 +95,24 @@ def test_each_material_prints_as_its_preset_and_a_hard_one_not_at_all(four):
             assert step.max_depth_m == pytest.approx(other.max_depth_m, rel=1e-6)
             assert step.compressed_m3 == pytest.approx(other.compressed_m3, rel=1e-6)
             assert step.rim_m3 == pytest.approx(other.rim_m3, rel=1e-6)
+
+
+def test_steps_on_a_hard_material_are_in_the_events_and_heard(four, tmp_path):
+    choose()
+    table = bake(four).report["events"]
+    hard = [row for row in table if row["surface"] == "hard"]
+    strikes = [row for row in hard if row["phase"] == "heel_strike"]
+    assert len(strikes) >= 2
+    assert all(row["position"][1] < BORDERS[2] + 0.15 and row["step"] == "" for row in hard)
+    four.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    four.collection.objects.link(four.camera)
+    for stereo in (False, True):
+        path = tmp_path / "heard.wav"
+        sound_exports.write(four, four.softground.ground, path, 1, 110, stereo=stereo)
+        heard = np.abs(wave_file.read(path))
+        for row in strikes:
+            at = round(row["time_s"] * wave_file.RATE)
+            assert heard[at : at + 1000].max() > 3 * heard[max(0, at - 1500) : at - 500].max()
 
 
 def test_one_preset_in_all_slots_is_as_without_bit_for_bit(four):
@@ -191,6 +212,23 @@ def test_the_panel_has_a_menu_for_each_material_with_its_preset(four):
     menus = [call.kwargs["text"] for call in layout.operator_menu_enum.call_args_list]
     assert labels == ["White", "Yellow", "Brown", "Grey"]
     assert menus == ["As the Ground", "Dry Sand", "Hard Floor", "? custard"]
+
+
+def test_a_path_sets_the_preset_of_a_material_as_the_menu_does(four):
+    ground = four.softground.ground
+    for path, text in (("slots[1]", "dry_sand"), ('slots["Brown"]', "mud"), ("slots['Grey']", "none")):
+        setting_paths.assign(four.softground, path, text)
+    assert [slot.material.softground_preset for slot in ground.material_slots] == list(PRESETS)
+    setting_paths.assign(four.softground, "slots[1]", "")
+    assert ground.material_slots[1].material.softground_preset == ""
+    for path, text, message in (
+        ("slots[1]", "custard", "There is no preset 'custard'"),
+        ("slots[4]", "mud", "no such material slot, 4: choose one of its materials .'White', 'Yellow'"),
+        ('slots["Blue"]', "mud", "no such material slot, 'Blue'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            setting_paths.assign(four.softground, path, text)
+    assert [slot.material.softground_preset for slot in ground.material_slots] == ["", "", "mud", "none"]
 
 
 def test_more_presets_than_the_solver_takes_are_refused(four):
@@ -297,13 +335,15 @@ def test_soles_carry_what_sticks_onto_a_hard_material(four):
     assert max(y) < BORDERS[2] + 0.01
 
 
-def test_the_command_line_bakes_what_the_file_says(four, tmp_path):
+def test_the_command_line_bakes_what_it_and_the_file_say(four, tmp_path):
     choose()
     expected = [(row["id"], row["surface"], row["compressed_m3"]) for row in bake(four).report["steps"]]
     bpy.ops.softground.clear_bake()
+    choose((*PRESETS[:2], "", ""))
     shot, report = tmp_path / "four.blend", tmp_path / "report.json"
     bpy.ops.wm.save_as_mainfile(filepath=str(shot))
-    done = command_line.run("bake", shot, "--dry-run", "--report", report)
+    of_slots = ("--set", "slots['Brown']=mud", "--set", "slots[3]=none")
+    done = command_line.run("bake", shot, "--dry-run", *of_slots, "--report", report)
     assert done.returncode == 0, done.stderr
     steps = json.loads(report.read_text())["steps"]
     assert [(row["id"], row["surface"], row["compressed_m3"]) for row in steps] == expected

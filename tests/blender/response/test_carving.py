@@ -6,18 +6,20 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs, settings
+from softground_addon.blender import ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
 from softground_addon.core.carving import carves
 from softground_addon.core.errors import InputError
+from softground_addon.core.ground import presets
 from softground_addon.core.ground.sparse_grid import TILE, Window
 from softground_addon.core.pressing.repose import NEIGHBOURS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from tests.blender import shots
+from tests.blender.grounds import field
 
 FRAMES = 44
 CELL = 0.01
@@ -169,6 +171,29 @@ def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
     for one, other, way in NEIGHBOURS:
         slope = np.abs((rim - compression)[one] - (rim - compression)[other]) / (CELL * np.hypot(*way))
         assert np.degrees(np.arctan(slope[at_rest[one] & at_rest[other]].max())) < 33.0
+
+
+def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatch, tmp_path):
+    monkeypatch.setattr(preset_files, "user_folder", lambda: tmp_path)
+    walker(scene, **SHIN_DEEP)
+    options, ground = scene.softground, field(scene, vertices=120, size=6.0)
+    options.detail, options.debris, options.marks = "NEVER", False, False
+    expected = bake(scene)[1]
+    deep = ground_presets.as_preset(options, "Deep")
+    (tmp_path / "deep.json").write_text(presets.dump(deep))
+    ground.data.materials.append(bpy.data.materials.new("Bank"))
+    ground.data.materials[0].softground_preset = "deep"
+    bpy.ops.softground.load_preset(name="Dry Sand")
+    options.cell_size, options.debris = CELL, False
+    options.pressure = "CENTRE_OF_PRESSURE"
+    left = bake(scene)[1]
+    assert {step.surface for step in left.footprints} == {"snow"}
+    assert left.carves.keys() == expected.carves.keys()
+    assert left.carves
+    for number, carve in left.carves.items():
+        whole = expected.carves[number]
+        assert np.array_equal(carve.tile(carve.rim), whole.tile(whole.rim))
+        assert np.array_equal(carve.tile(carve.compression), whole.tile(whole.compression))
 
 
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):

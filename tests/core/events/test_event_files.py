@@ -10,6 +10,7 @@ import pytest
 
 from softground_addon.core.events import event_files, event_midi
 from softground_addon.core.events.events import COLUMNS
+from softground_addon.core.ground.surfaces import SURFACES
 
 RATE = 24.0
 
@@ -59,6 +60,12 @@ def assert_notes(notes):
     assert [one[3] - one[0] for one in notes] == pytest.approx([0.6] * 3, abs=2 / 960)
     assert [one[1] for one in notes] == [36, 49, 38]
     assert [one[2] for one in notes] == [round(127 * (f / 3) ** 0.7) for f in (1.1, 2.4, 3.0)]
+
+
+def test_a_hard_floor_has_notes_of_its_own():
+    notes = {event_midi.note(event(0.0, "land", f"foot.{side}", surface="hard")) for side in "LRX"}
+    assert notes == {56, 57, 58}
+    assert not notes & {note for of in SURFACES.values() for note in range(of.midi_note, of.midi_note + 3)}
 
 
 def test_midi_is_as_its_standard_says():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.debris.step_throws import throws_of
 from softground_addon.core.events.events import COLUMNS, as_edited, between, events
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.edits import StepEdit, step_id
@@ -66,6 +67,32 @@ def test_a_contact_that_is_there_from_the_start_has_not_landed():
     rows = events([cut], [], surface="snow", first_frame=motion.frames[0])
     assert rows[0]["phase"] not in ("heel_strike", "land")
     assert rows[0]["time_s"] > 0
+
+
+def on_hard(loads):
+    """The same loads, with the left foot's contacts on a hard floor, as `loads.missing_ground` says it."""
+    hard = loads.contacts.touching & np.array([sole.sole.side == "L" for sole in loads.motion.soles])
+    return replace(loads, contacts=replace(loads.contacts, touching=loads.contacts.touching & ~hard, hard=hard))
+
+
+def test_a_step_on_a_hard_floor_has_the_events_of_one_on_soft_ground_and_no_print(baked, table):
+    loads, footprints = baked
+    pressed_ones = [step for step in footprints if step.sole == "foot.R"]
+    rows = events([on_hard(loads)], pressed_ones, surface="snow", first_frame=1.0)
+    same = ("time_s", "contact", "phase", "side", "position", "peak_force_n", "impulse_ns", "duration_s")
+    assert [[row[name] for name in same] for row in rows] == [[row[name] for name in same] for row in table]
+    for row, soft in zip(rows, table, strict=True):
+        if row["contact"] == "foot.L":
+            assert (row["step"], row["depth_m"], row["area_m2"], row["surface"]) == ("", 0.0, 0.0, "hard")
+        else:
+            assert row == soft
+
+
+def test_a_hard_floor_throws_nothing(baked):
+    loads, footprints = baked
+    throws = throws_of([on_hard(loads)], footprints, surface="snow")
+    assert throws
+    assert {footprints[throw.number].sole for throw in throws} == {"foot.R"}
 
 
 def test_a_foot_that_brushes_the_ground_as_it_swings_scuffs():

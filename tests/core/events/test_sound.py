@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.events import sound, wave_file
@@ -90,6 +91,31 @@ def test_pitch_and_length_are_those_of_the_surface(grounds, surface, low, high):
         heard = sound.step_sound(step)[1]
         assert low < centroid(heard) < high
         assert 0.2 < lasting(heard) < 0.75
+
+
+def test_a_step_on_a_hard_floor_clicks_as_it_comes_down_and_no_print_is_needed(loads):
+    """In time with its strike, short, and not as on any ground that gives way; as loud as the force."""
+    hard = loads.contacts.touching & (np.arange(2) == 0)
+    there = replace(loads, contacts=replace(loads.contacts, touching=loads.contacts.touching & ~hard, hard=hard))
+    table = events([there], [], surface="snow", first_frame=1.0)
+    strikes = [row for row in table if row["phase"] == "heel_strike" and row["contact"] == "foot.L"]
+    steps = sound.steps_of({}, table, frame_rate=30.0, first_frame=1.0)
+    assert [step.struck for step in steps] == pytest.approx([row["time_s"] for row in strikes], abs=1e-6)
+    assert {step.surface for step in steps} == {"hard"}
+    for step, row in zip(steps, strikes, strict=True):
+        begin, heard = sound.step_sound(step)
+        loud = np.abs(heard) > 0.05 * np.abs(heard).max()
+        assert 0 <= (begin + np.flatnonzero(loud)[0]) / RATE - row["time_s"] + 1 / RATE < 0.004
+        assert 300 < centroid(heard) < 3000
+        assert lasting(heard) < 0.2
+        assert step.position == pytest.approx(row["position"])
+        assert trapezoid(step.force, step.time) == pytest.approx(
+            sum(one["impulse_ns"] for one in table if one["contact"] == "foot.L" and one["phase"] != "toe_off") / 2,
+            rel=0.2,
+        )
+    assert sound.step_sound(replace(steps[0], force=2 * steps[0].force))[1].std() == pytest.approx(
+        2 * sound.step_sound(steps[0])[1].std(), rel=0.01
+    )
 
 
 @pytest.mark.parametrize("surface", ["snow", "soil"])

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.carving import carves
+from softground_addon.core.carving.carver import Walls
 from softground_addon.core.checks.volumes import check_volumes
 from softground_addon.core.composers.edited_steps import with_edits
 from softground_addon.core.composers.simulation import simulate
@@ -17,6 +19,7 @@ from softground_addon.core.ground.presets import FOLDER, find, load
 from softground_addon.core.ground.regions import HARD, GroundKind, Regions, numbered
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import Window
+from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.ground.variation import PaintedSurface
 from softground_addon.core.record import record
@@ -128,6 +131,20 @@ def test_shares_are_one_in_sum_and_go_over_evenly_across_two_cells():
     assert kinds == [0, 1]
     assert shares.sum(axis=0) == pytest.approx(1.0)
     assert shares[1] == pytest.approx(np.tile([0, 0, 0, 0, 1 / 3, 2 / 3, 1, 1, 1, 1], (4, 1)))
+
+
+def test_layers_are_as_deep_as_those_of_the_kinds_and_walls_those_of_the_kind_under_a_step():
+    deep, shallow = (
+        GroundKind(surface, replace(SNOW, layer_depth=depth)) for surface, depth in (("snow", 0.8), ("sand", 0.2))
+    )
+    ground, window = stripes([0.3], (deep, shallow)), Window(-2, 3, 10, 4)
+    assert ground.layer_depths(window, 0.1)[0] == pytest.approx([0.8, 0.8, 0.8, 0.8, 0.6, 0.4, *[0.2] * 4])
+    assert ground.layer_depths(Window(5, 0, 4, 4), 0.1) == 0.2
+    assert alone(ground, deep).layer_depths(window, 0.1) == 0.8
+    for x, kind in ((0.22, deep), (0.38, shallow)):
+        _, (step,) = pressed(standing(box_sole(0.3, 0.1), [x, 0.0, 0.0], 700.0), ground)
+        of_step = carves._walls(step, ground, "mud")
+        assert of_step == Walls.of(SURFACES[kind.surface], kind.material, ground.gravity)
 
 
 def test_beside_the_ground_there_is_no_other_kind():
