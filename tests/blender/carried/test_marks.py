@@ -264,7 +264,7 @@ def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, s
     ground = scene.softground.ground
     counts = {frame: len(at(scene, frame).vertices) for frame in (60, 84)}
     path = tmp_path / f"shot.{suffix}"
-    write(scene, ground, path, 58, 84)
+    write(ground, path, 58, 84)
     known = set(bpy.data.objects)
     read(str(path))
     found = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]
