@@ -207,8 +207,11 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     assert len(without.shaping) == len(left.shaping) - 2
     assert without.carves.keys() == left.carves.keys()
     wanted = settings.snapshot(scene)
-    assert not staleness.reasons(scene, wanted)
-    assert staleness.reasons(scene, replace(wanted, carve=False)) == ("The settings have changed",)
+    of = scene.softground.ground, scene.objects
+    assert not staleness.reasons(*of, wanted)
+    assert staleness.reasons(*of, replace(wanted, carve=False)) == (
+        "The settings have changed",
+    )
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
@@ -224,7 +227,7 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     name = step_id(step)
 
     def edited(edits):
-        step_edits.edit(scene, step_edits.editable(scene), edits)
+        jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), edits))
         return baked_ground.record_of(scene.softground.ground)
 
     def lying(records, away=(0.0, 0.0)):
@@ -267,7 +270,7 @@ def test_a_bake_from_before_carving_is_still_current(scene):
     bake(scene)
     wanted = settings.snapshot(scene)
     assert "carve" not in wanted.inputs()
-    assert not staleness.reasons(scene, wanted)
+    assert not staleness.reasons(scene.softground.ground, scene.objects, wanted)
 
 
 def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
