@@ -209,9 +209,7 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     wanted = settings.snapshot(scene)
     of = scene.softground.ground, scene.objects
     assert not staleness.reasons(*of, wanted)
-    assert staleness.reasons(*of, replace(wanted, carve=False)) == (
-        "The settings have changed",
-    )
+    assert staleness.reasons(*of, replace(wanted, carve=False)) == ("The settings have changed",)
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
