@@ -73,11 +73,11 @@ def choose(ground: bpy.types.Object | None, slot: int | str, preset: str) -> Non
     InputError
         If there is no such slot, it has no material of the user's that can be changed, or there is no such preset.
     """
-    materials = [theirs(one.material) for one in ground.material_slots] if ground else []
-    number = next((n for n, one in enumerate(materials) if one and one.name == slot), slot)
+    materials = [theirs(each.material) for each in ground.material_slots] if ground else []
+    number = next((n for n, each in enumerate(materials) if each and each.name == slot), slot)
     if ground is None or number not in range(len(materials)):
-        there = ", ".join(repr(one.name) for one in materials if one)
-        raise InputError(f"The ground has no such material slot, {slot!r}: choose one of its materials ({there}).")
+        names = ", ".join(repr(each.name) for each in materials if each)
+        raise InputError(f"The ground has no such material slot, {slot!r}: choose one of its materials ({names}).")
     material = materials[int(number)]
     if material is None:
         raise InputError(f"Slot {int(number) + 1} of '{ground.name}' has no material: give it one first.")

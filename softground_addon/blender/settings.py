@@ -16,7 +16,7 @@ from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.rig.mapping import SoleSource
 from ..core.rig.recording import SceneUnits
-from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions
+from ..core.settings import DOWN, BakeSettings, CharacterSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
 from . import ground_slots, tread_images
@@ -122,6 +122,14 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
     options.slowed_time = (render.frame_map_old, render.frame_map_new)
 
 
+def gravity_direction_of(scene: bpy.types.Scene) -> tuple[float, float, float]:
+    """Where a scene's gravity points, of length 1; down where it is switched off."""
+    if not (scene.use_gravity and scene.gravity.length > 0):
+        return DOWN
+    x, y, z = scene.gravity.normalized()[:]
+    return typed(x), typed(y), typed(z)
+
+
 def units_of(scene: bpy.types.Scene) -> SceneUnits:
     """Frames, lengths and gravity of a scene, as they are now; the Earth's gravity where it is switched off."""
     pull = float(scene.gravity.length) if scene.use_gravity else 0.0
@@ -186,6 +194,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
+        gravity_direction=gravity_direction_of(scene),
     )
 
 

@@ -23,6 +23,8 @@ from .rig.mapping import SoleSource
 from .rig.recording import SceneUnits
 from .weather.felt_weather import FeltWeather
 
+DOWN = (0.0, 0.0, -1.0)
+
 TIME_LIMIT = "Time Limit in Advanced > Mesh and Look, or --set longest_bake=N"
 """By what the user sets `BakeSettings.longest_bake_s`."""
 
@@ -180,6 +182,8 @@ class BakeSettings(SceneUnits):
         Whether bodies carve deep ground where their feet are let down.
     regions : tuple of RegionSettings
         Slots of the ground that are made of something else, or are hard.
+    gravity_direction : (float, float, float)
+        Unit vector in the world.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -218,6 +222,7 @@ class BakeSettings(SceneUnits):
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
+    gravity_direction: tuple[float, float, float] = field(default=DOWN, metadata=UNSAID)
 
     @property
     def spacing_m(self) -> float:
@@ -258,6 +263,8 @@ def _part(group: Any, first: Acts, last: Acts, inherited: Acts = Acts.READING) -
     """The fields of a dataclass that act on some stages, and those of what it holds."""
     values: dict[str, Any] = {}
     for setting in fields(group):
+        if not setting.compare:
+            continue
         value, acts = getattr(group, setting.name), setting.metadata.get("acts", inherited)
         if setting.metadata.get("said_if_on") and value == setting.default:
             continue

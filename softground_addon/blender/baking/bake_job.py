@@ -156,6 +156,9 @@ def bake(
         playback_error_m=published.error if published else None,
         findings=[*findings, *of_responses, *refused],
     )
+    place = settings.find(wanted.ground) if wanted.ground else None
+    for table in ("steps", "events"):
+        result[table] = baked_ground.events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
     if published:
         sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
@@ -253,7 +256,7 @@ def _given(
     """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; what it lacks."""
     assert wanted.ground is not None
     name, vertices = wanted.ground, surface.vertices
-    detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
+    detail, cell_size, unit_scale, frame = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m, wanted.frame
     index = yield from meanwhile(
         Progress("write", 0.1), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
@@ -262,10 +265,10 @@ def _given(
     findings = coverage_findings(ground, cover, detail, cell_size)
     too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
     if not too_coarse and not wants_detail(ground, cover, detail, cell_size, sole_length):
-        if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
+        if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    coarse = yield from meanwhile(Progress("write", 0.1), trail_detail.surface_of.slices(ground, unit_scale))
+    coarse = yield from meanwhile(Progress("write", 0.1), trail_detail.surface_of.slices(ground, unit_scale, frame))
     refinement = yield from meanwhile(
         Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )

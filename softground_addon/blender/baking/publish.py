@@ -144,6 +144,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             table,
             stored,
             unit_scale=made_with.unit_scale_m,
+            frame=made_with.frame,
             shape_keys=made_with.shape_keys
             and (made_with.dense_shape_keys or not display_key.is_dense(settings.found(place.display_mesh))),
             marks=marks,

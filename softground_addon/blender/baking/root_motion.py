@@ -119,6 +119,8 @@ def _layer(
     path = path_of_bone(bone, "location") if bone else "location"
     duration = (motion.frames[-1] - motion.frames[0]) / motion.frame_rate
     way = np.append(duration * velocity, 0.0) / wanted.unit_scale_m
+    if wanted.frame and not wanted.frame.moves:
+        way = np.linalg.inv(np.array(wanted.frame.matrix))[:3, :3] @ way
     ends = np.stack([np.zeros(3), way])
     frames = motion.frames[[0, -1]] * wanted.time_stretch
     curves = [LayerCurve(path, axis, bone or "Object Transforms", frames, ends[:, axis]) for axis in range(3)]

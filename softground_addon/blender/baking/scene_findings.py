@@ -10,15 +10,17 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.findings import Finding, listed
-from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
 from .. import settings
+from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.constraint_layer import is_own
 from ..characters.selection import all_leaders
 from ..compat import HAS_SLOTS, slot_of
 from ..ground.still_ground import changes_shape
+from ..placement import UP, world_matrix
 from ..reading import staleness
 from ..reading.shots import Shot
-from ..rigs.frame_ranges import playing_tracks
+from ..rigs.frame_ranges import ancestors, playing_tracks
 from ..sampling.body_sampling import deforms, meshes_of
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.sampling_scene import object_named
@@ -40,7 +42,7 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
     first, last = (frame * wanted.time_stretch for frame in wanted.frames)
     return [
         *shot.findings,
-        *(finding for motion in shot.motions for finding in _distance(motion, wanted)),
+        *_distance(dict.fromkeys(movers), wanted),
         *_idle_actions(followed, first, last),
         *_idle_drivers(followed),
         *shape_findings(
@@ -54,28 +56,56 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
 
 def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
     """Gravity that does not point down."""
-    if gravity.length > 0 and -gravity.normalized().z < UPRIGHT:
+    direction = np.array(wanted.gravity_direction)
+    up = np.array(wanted.frame.matrix)[2, :3] if wanted.frame and not wanted.frame.moves else np.array(UP)
+    if -direction @ up < UPRIGHT and not (wanted.frame and wanted.frame.moves):
         yield Finding(
             "gravity_direction",
             "note",
             f"Gravity of scene '{wanted.scene}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
-            f"bodies weigh straight down in a bake, by {wanted.gravity_m_s2:.2f} m/s².",
-            "Turn the shot so that down is -Z, and set Gravity in the Scene properties to match.",
+            "no character stands upright in it: bodies weigh straight down in the bake, by "
+            f"{wanted.gravity_m_s2:.2f} m/s².",
+            "Set Gravity in the Scene properties to point where the feet of the characters do.",
         )
 
 
-def _distance(motion: CharacterMotion, wanted: BakeSettings) -> Iterator[Finding]:
-    """Places so far away that single precision does not tell cells apart."""
-    far = max((float(np.abs(sole.transforms[..., :3, 3]).max()) for sole in motion.soles), default=0.0)
-    step = float(np.spacing(np.float32(far / wanted.unit_scale_m))) * wanted.unit_scale_m
-    if step > ROUNDING * wanted.cell_size_m:
-        yield Finding(
-            "far_from_origin",
-            "warning",
-            f"'{motion.name}' is {far / 1e3:.0f} km from the world's origin, where Blender rounds positions to "
-            f"{step * 100:.2g} cm: steps are off by as much, and prints too deep or too shallow.",
-            "Move the character and its ground to the origin, and bake again.",
-        )
+def _distance(movers: Iterable[bpy.types.Object], wanted: BakeSettings) -> Iterator[Finding]:
+    """Shots so far from the world's origin that Blender does not tell cells apart: what was moved there object by
+    object is off by that, and the rest looks so."""
+    if wanted.frame is None:
+        return
+    for mover in movers:
+        far = float(np.abs(world_matrix(mover)[:3, 3]).max())
+        step = float(np.spacing(np.float32(far))) * wanted.unit_scale_m
+        if step <= ROUNDING * wanted.cell_size_m:
+            continue
+        off = [node for node in (mover, *ancestors(mover)) if _is_rounded(node, far)]
+        where = f"'{mover.name}' is {far * wanted.unit_scale_m / 1e3:.0f} km from the world's origin, where Blender"
+        if off:
+            yield Finding(
+                "far_from_origin",
+                "warning",
+                f"{where} rounds positions to {step * 100:.2g} cm, and keys or constraints move '{off[0].name}' there: "
+                "steps are off by as much.",
+                "Parent it to an empty at that place, keyed near the empty, or move the shot to the origin.",
+            )
+        else:
+            yield Finding(
+                "far_from_origin",
+                "note",
+                f"{where} shows positions rounded to {step * 100:.2g} cm. The bake is read and solved about its own "
+                "ground, and is as exact as at the origin.",
+                "Move the shot to the origin if it trembles in the viewport or in pictures.",
+            )
+
+
+def _is_rounded(node: bpy.types.Object, far: float) -> bool:
+    """True if something moves an object to places that are far away themselves, about as far as that."""
+    keyed = any(path.startswith("location") for path, _ in animated_paths(node))
+    owners = (node, *(node.pose.bones if node.type == "ARMATURE" else ()))
+    constraints = (constraint for owner in owners for constraint in owner.constraints if not is_own(constraint))
+    is_held = any(not constraint.mute and constraint.influence for constraint in constraints)
+    return is_held or (keyed and float(np.abs(np.array(node.location)).max()) > far / 2)
 
 
 def _idle_actions(objects: Iterable[bpy.types.Object], first: float, last: float) -> Iterator[Finding]:

@@ -71,7 +71,8 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     left = baked_ground.record_of(ground)
     made_with = _made_with(settings.snapshot(scene), left)
     names = painted_ground.names_of(ground, made_with.painted)
-    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, made_with.kinds[1])
+    of_slots, frame = made_with.kinds[1], made_with.frame
+    undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, of_slots, frame)
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
     low, high = _extent(left)
     looking = ground_surface.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))

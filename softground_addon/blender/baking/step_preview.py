@@ -31,10 +31,10 @@ class StepPreview:
     def __init__(self, ground: bpy.types.Object, bake: EditableBake) -> None:
         shown = baked_ground.display_mesh_of(ground)
         self._bake, self._name = bake, settings.name_of(shown)
-        unit_scale = bake.made_with.unit_scale_m
-        place = ground_surface.rest_vertices(shown, unit_scale)
+        unit_scale, frame = bake.made_with.unit_scale_m, bake.made_with.frame
+        place = ground_surface.rest_vertices(shown, unit_scale, frame)
         self._x, self._y = np.ascontiguousarray(place.T[:2])  # axis by axis: looked through at each move
-        self._up = ground_surface.up_of(shown, unit_scale)
+        self._up = ground_surface.up_of(shown, unit_scale, frame)
         self._before = ground_mesh.displayed_positions(shown)
         self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
         self._changed: list[Window] = []

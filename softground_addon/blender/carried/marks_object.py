@@ -22,6 +22,7 @@ from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..placement import hang_on
 from . import marks_nodes as nodes
 from .marks_material import material_for
 
@@ -54,6 +55,8 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
         exchange(older, mesh)
     obj.location += Vector(mesh[ORIGIN]) - before
     BELONGS.give(ground, obj)
+    if units.frame:
+        hang_on(obj, ground, units.frame)
     _play(modifier or obj.modifiers.new(NAME, "NODES"), group)
     _remove_unused()
     return obj

@@ -18,12 +18,13 @@ from ...core.rig.skin_mass import skin_mass
 from ...core.rig.sole_extraction import bone_families
 from ...core.settings import ObjectName
 from .. import jobs
+from ..placement import units_about
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import record
 from ..sampling.skin_sampling import read_skin
-from ..settings import found, name_of, units_of
+from ..settings import found, name_of
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
@@ -85,7 +86,7 @@ def recognise(
         return Recognised(mapping)
     if skin is None:
         return Recognised(mapping if mapping.soles else _mapped(armature, posed=True))
-    units = units_of(scene)
+    units = units_about(scene, armature)
     samples = range(scene.frame_current, scene.frame_current + 1)
     moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
     if frames and moves:
@@ -114,7 +115,7 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
         return Recognised(RigMapping(method="skin"), body=body)
     first, last = body_frames(scene, found(name))
     samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record_body(scene, name, body, samples, units_of(scene))
+    reading = record_body(scene, name, body, samples, units_about(scene, found(name)))
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
     mass = yield from jobs.meanwhile(read, weighing)

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
 from ...core.debris import flight
@@ -20,6 +20,7 @@ from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..placement import hang_on, matrix_in
 from ..settings import find, name_of
 from . import debris_nodes as nodes
 from . import debris_shapes
@@ -74,7 +75,8 @@ def put(
         return None
     before = _origin_of(older) if older else Vector()
     follows = older is None or older.parent == BELONGS.owner_of(older)  # or the user has given it another parent
-    origin = ground.matrix_world.translation if follows else before  # of both, or a line would be drawn between them
+    its_place = Matrix(matrix_in(units.frame, ground).tolist()) if units.frame else ground.matrix_world
+    origin = its_place.translation if follows else before  # of both, or a line would be drawn between them
     modifier: Any = _modifier_of(older) if older else None
     looks = list(dict.fromkeys([surface, *(of_steps[number] for number in sorted(of_steps))]))
     with none_left_if_it_fails():
@@ -85,7 +87,7 @@ def put(
         exchange(older, points)
     BELONGS.give(ground, obj)
     if follows:
-        obj.parent, obj.matrix_parent_inverse = ground, ground.matrix_world.inverted()
+        hang_on(obj, ground, units.frame)
         obj.location += origin - before
     _play(modifier or obj.modifiers.new(MODIFIER, "NODES"), group)
     return obj

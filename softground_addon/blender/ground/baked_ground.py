@@ -15,6 +15,7 @@ from ...batch.manifest_values import FRAME_LIMIT
 from ...core.errors import InputError
 from ...core.events.events import Event, as_edited
 from ...core.ground.material import MATERIAL_RANGES, OFF
+from ...core.motion.ground_frame import GroundFrame, in_world, rows
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
@@ -24,6 +25,7 @@ from ...core.settings import ObjectName
 from ..carried import marks_object
 from ..debris import debris_object
 from ..jobs import Job, Progress
+from ..placement import to_world
 from ..plants import trampling_table
 from ..playback import own_data, playback
 from ..settings import SceneUnits, exists, found, name_of
@@ -143,6 +145,7 @@ def write(
     stored: bytes,
     *,
     unit_scale: float,
+    frame: GroundFrame | None = None,
     shape_keys: bool = True,
     marks: Array | None = None,
     water: Array | None = None,
@@ -163,6 +166,8 @@ def write(
         The footprints, from `core.record.record`.
     unit_scale : float
         Metres per Blender unit.
+    frame : GroundFrame, optional
+        That the positions are in.
     shape_keys : bool
         See `ground_mesh.write`.
     marks : (K, 3) float array, optional
@@ -173,7 +178,7 @@ def write(
     found(table)  # or nothing is written
     ground_checks.check_playable(found(place.display_mesh))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
-    up = ground_surface.up_of(found(place.display_mesh), unit_scale)
+    up = ground_surface.up_of(found(place.display_mesh), unit_scale, frame)
     with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
         ground_mesh.write(found(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
         if place.is_draft:
@@ -273,7 +278,19 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     table = left.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    return as_edited(table, left.steps, left.laid_carves)
+    inputs, rows_as_edited = left.about["inputs"], as_edited(table, left.steps, left.laid_carves)
+    return events_in_world(rows_as_edited, frame_in(inputs), ground, inputs["unit_scale_m"])
+
+
+def events_in_world(
+    table: Sequence[Mapping[str, Any]], frame: GroundFrame | None, ground: bpy.types.Object | None, unit_scale: float
+) -> list[dict[str, Any]]:
+    """Rows about a bake, with their places in the world as its ground lies now."""
+    if frame is None:
+        return [dict(row) for row in table]
+    in_metres = np.array(to_world(frame, ground), dtype=np.float64)
+    in_metres[:3, 3] *= unit_scale
+    return in_world(table, in_metres)
 
 
 def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
@@ -304,7 +321,8 @@ def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str
 
 def units_of(inputs: Mapping[str, Any]) -> SceneUnits:
     """Units of the frames, lengths and forces of a bake, by the inputs that its record has; errors as `unit_of`."""
-    return SceneUnits(**{each.name: unit_of(inputs, each.name) for each in fields(SceneUnits)})
+    numbers = {each.name: unit_of(inputs, each.name) for each in fields(SceneUnits) if each.name != "frame"}
+    return SceneUnits(**numbers, frame=frame_in(inputs))
 
 
 def unit_of(inputs: Mapping[str, Any], name: str) -> float:
@@ -319,6 +337,23 @@ def unit_of(inputs: Mapping[str, Any], name: str) -> float:
     if not 1.0 / LARGEST_UNIT <= unit <= LARGEST_UNIT:
         raise ValueError("its units are unknown")
     return unit
+
+
+def frame_in(inputs: Mapping[str, Any]) -> GroundFrame | None:
+    """The frame that a bake was solved in, by the inputs that its record has; None where that is the world's.
+
+    Raises
+    ------
+    InputError
+        If it is damaged.
+    """
+    if (said := inputs.get("frame")) is None:
+        return None
+    with suppress(KeyError, TypeError, ValueError, OverflowError, np.linalg.LinAlgError):
+        matrix = np.array(said["matrix"], dtype=np.float64).reshape(4, 4)
+        if np.isfinite(np.linalg.inv(matrix)).all():
+            return GroundFrame(rows(matrix), bool(said.get("moves", False)))
+    raise InputError("The stored record of the footprints does not say where they lie: clear the bake and bake again.")
 
 
 def frames_of(inputs: Mapping[str, Any]) -> tuple[int, int]:

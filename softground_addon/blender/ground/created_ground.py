@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -14,11 +14,13 @@ from ...core.composers.ground_plan import GroundPlan
 from ...core.ground.material import GroundMaterial
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
 from ..materials.materials import EDGE, drafted, ensure_material
 from ..mesh_arrays import add_faces
+from ..placement import to_world
 from ..settings import find, found, name_of
 from .ground_mesh import discard, mesh_of, write_positions
 
@@ -47,6 +49,8 @@ class Layout:
         Positions in the object's own space and units.
     location : (3,) float32 array
         Of the object, in Blender units.
+    frame : GroundFrame or None
+        That all of these are in, instead of the world.
     corner_vertex, face_size : int arrays
         See `GradedGrid`.
     """
@@ -56,6 +60,7 @@ class Layout:
     location: NDArray[np.float32]
     corner_vertex: NDArray[np.intp]
     face_size: NDArray[np.intp]
+    frame: GroundFrame | None = None
 
 
 def created(drafts: ExitStack, wanted: BakeSettings, plan: GroundPlan) -> Slices[tuple[ObjectName, Layout]]:
@@ -67,6 +72,7 @@ def created(drafts: ExitStack, wanted: BakeSettings, plan: GroundPlan) -> Slices
         reach=reach_of(wanted.material),
         close_up=_close_up(wanted, plan),
     )
+    layout = replace(layout, frame=wanted.frame)
     yield
     drafts.enter_context(drafted(wanted.surface))
     yield
@@ -158,6 +164,8 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
         add_faces(mesh, corner_vertex, face_start, *edges)
         ground = bpy.data.objects.new("SoftGround", mesh)
         ground.location = layout.location.tolist()
+        if layout.frame:
+            ground.matrix_basis = to_world(layout.frame, ground) @ ground.matrix_basis
         name = name_of(ground)
     drafts.callback(_discard_unpublished, name)
     del edges

@@ -31,8 +31,9 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
         )
 
 
-def hard_fault(obj: bpy.types.Object) -> str:
-    """What keeps soles from standing on an object as hard ground, and the remedy; empty where nothing does."""
+def hard_fault(obj: bpy.types.Object, ground: bpy.types.Object | None = None) -> str:
+    """What keeps soles from standing on an object as hard ground beside a ground, and the remedy; empty where nothing
+    does."""
     name = obj.name
     if obj.type != "MESH":
         return (
@@ -40,8 +41,14 @@ def hard_fault(obj: bpy.types.Object) -> str:
         )
     if obj.mode == "EDIT":
         return f"'{name}' in Hard Ground is in Edit Mode: leave it with Tab first."
-    if mover := still_ground.mover_of(obj):
+    mover, carrier = still_ground.mover_of(obj), still_ground.mover_of(ground) if ground else None
+    if mover and mover != carrier:
         return f"'{name}' in Hard Ground moves, as '{mover.name}' is animated: remove it from the list, or its keys."
+    if carrier and mover is None:
+        return (
+            f"'{name}' in Hard Ground stands still while '{carrier.name}' moves the ground: parent it to that, or "
+            "remove it from the list."
+        )
     if by := still_ground.changes_shape(obj):
         return f"'{name}' in Hard Ground changes its shape by {by}: remove it from the list, or apply that."
     return ""
@@ -77,9 +84,3 @@ def check_usable(ground: bpy.types.Object) -> None:
         )
     if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
         raise InputError(f"Ground '{name}' is scaled to zero: give it a scale other than 0 (Alt-S).")
-    mover = still_ground.mover_of(ground)
-    if mover:
-        raise InputError(
-            f"Ground '{name}' moves: '{mover.name}' is animated. Only ground that stands still takes prints: take the "
-            "keys and drivers off it, or choose a copy without them."
-        )

@@ -17,9 +17,11 @@ from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.regions import HARD
 from ...core.ground.terrain import MeshTerrain
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.slices import Slices, sliced
 from .. import ground_slots, mesh_arrays
 from ..compat import remove_scene
+from ..placement import matrix_in
 from ..playback import display_key, playback, weather_modifier
 from . import painted_ground
 from .ground_mesh import mesh_of, rest_positions, users_modifiers, write_positions
@@ -113,15 +115,15 @@ def pressed_vertices(
     return np.concatenate(pressed)
 
 
-def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """World positions of the mesh's vertices without any bake or modifier, (V, 3) [m].
+def rest_vertices(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Array:
+    """Positions, in the world or in a frame, of the mesh's vertices without any bake or modifier, (V, 3) [m].
 
     Raises
     ------
     InputError
         If some are no numbers.
     """
-    vertices = _transform(to_world_of(ground, unit_scale), rest_positions(mesh_of(ground)))
+    vertices = _transform(to_world_of(ground, unit_scale, frame), rest_positions(mesh_of(ground)))
     if not np.isfinite(vertices).all():
         raise InputError(f"Ground '{ground.name}' has vertices without a valid position (NaN): delete them first.")
     return vertices
@@ -133,8 +135,9 @@ def undisturbed_surface(
     unit_scale: float,
     painted: painted_ground.Names = (),
     regions: Mapping[int, float] = MappingProxyType({}),
+    frame: GroundFrame | None = None,
 ) -> Slices[GroundSurface]:
-    """The ground as it is without any bake, in world space and metres, with what is painted on it.
+    """The ground as it is without any bake, in the world or in a frame, in metres, with what is painted on it.
 
     `regions` has the number of the kind of ground of each material slot that names one.
 
@@ -146,8 +149,8 @@ def undisturbed_surface(
         If the surface has points that are no numbers.
     """
     mesh, name = mesh_of(ground), ground.name
-    vertices = rest_vertices(ground, unit_scale)
-    to_world = to_world_of(ground, unit_scale)
+    vertices = rest_vertices(ground, unit_scale, frame)
+    to_world = to_world_of(ground, unit_scale, frame)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
         surface, faces, slots = vertices, mesh_arrays.read_faces(mesh), ground_slots.of_faces(mesh)
         factors = painted_ground.factors(ground, mesh, painted)
@@ -174,20 +177,25 @@ def _kinds(slots: NDArray[np.int32], regions: Mapping[int, float]) -> Array | No
     return kinds if kinds.any() else None
 
 
-def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """Object space to world space in metres, (4, 4), whether the ground is visible or not."""
-    placed = ground.matrix_world if ground.visible_get() else placed_by_parents(ground)
-    if placed is None:
-        with stand_in(ground) as evaluated:
-            placed = evaluated.matrix_world.copy()
-    matrix = np.array(placed, dtype=np.float64)
+def to_world_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Array:
+    """Object space to world space in metres, or to a frame, (4, 4), whether the ground is visible or not."""
+    if frame is not None and (frame.moves or placed_by_parents(ground) is not None):
+        matrix = matrix_in(frame, ground)
+    else:
+        placed = ground.matrix_world if ground.visible_get() else placed_by_parents(ground)
+        if placed is None:
+            with stand_in(ground) as evaluated:
+                placed = evaluated.matrix_world.copy()
+        matrix = np.array(placed, dtype=np.float64)
+        if frame is not None:
+            matrix = np.array(frame.matrix) @ matrix
     matrix[:3] *= unit_scale
     return matrix
 
 
-def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """World up in the ground's own space and units, of the length of one metre, (3,)."""
-    up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
+def up_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Array:
+    """Up in the ground's own space and units, of the length of one metre, (3,)."""
+    up: Array = np.linalg.inv(to_world_of(ground, unit_scale, frame)[:3, :3])[:, 2]
     return up
 
 

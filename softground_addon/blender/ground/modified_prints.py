@@ -10,6 +10,7 @@ from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
+from ...core.motion.ground_frame import GroundFrame
 from .. import mesh_arrays
 from ..playback import playback
 from . import ground_mesh, ground_surface
@@ -28,7 +29,14 @@ MARGIN = 0.1
 
 
 def are_undone(
-    ground: bpy.types.Object, vertices: Array, moved: Indices, terrain: Terrain, *, unit_scale: float, detail: str
+    ground: bpy.types.Object,
+    vertices: Array,
+    moved: Indices,
+    terrain: Terrain,
+    *,
+    unit_scale: float,
+    detail: str,
+    frame: GroundFrame | None = None,
 ) -> bool:
     """Return whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
 
@@ -44,6 +52,8 @@ def are_undone(
         Metres per Blender unit.
     detail : str
         Whether there may be a copy without modifiers, in the words of the settings.
+    frame : GroundFrame, optional
+        That the positions and the terrain are in.
 
     Raises
     ------
@@ -59,8 +69,9 @@ def are_undone(
         return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
         return False
-    to_world = ground_surface.to_world_of(ground, unit_scale)
-    with ground_surface.undisturbed_copy(ground, moved, LIFT * ground_surface.up_of(ground, unit_scale)) as raised:
+    to_world = ground_surface.to_world_of(ground, unit_scale, frame)
+    lift = LIFT * ground_surface.up_of(ground, unit_scale, frame)
+    with ground_surface.undisturbed_copy(ground, moved, lift) as raised:
         surface = mesh_arrays.positions(raised) @ to_world[:3, :3].T + to_world[:3, 3]
         triangles = mesh_arrays.triangles(raised)
     if np.linalg.det(to_world[:3, :3]) < 0:

@@ -14,6 +14,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.cell_keys import Keys, keys_of
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import ObjectName
@@ -60,10 +61,11 @@ def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
 
 
 @sliced
-def surface_of(ground: bpy.types.Object, unit_scale: float) -> Slices[Surface]:
-    """The faces of the ground as its modifiers leave it, in world space [m]; all is read in the first slice."""
+def surface_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Slices[Surface]:
+    """The faces of the ground as its modifiers leave it, in the world or a frame [m]; all is read at first."""
     with ground_surface.undisturbed_copy(ground) as source:
-        faces, to_world = mesh_arrays.read_faces(source), ground_surface.to_world_of(ground, unit_scale)
+        faces = mesh_arrays.read_faces(source)
+        to_world = ground_surface.to_world_of(ground, unit_scale, frame)
     yield
     return (yield from refined_mesh.surface_of.slices(faces, to_world))
 

@@ -21,7 +21,7 @@ def write(ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUni
     if trampled is None:
         return
     shown = baked_ground.display_mesh_of(ground)
-    place = ground_surface.rest_vertices(shown, units.unit_scale_m)
+    place = ground_surface.rest_vertices(shown, units.unit_scale_m, units.frame)
     latest = trampled.latest(place[:, 0], place[:, 1])
     passes = np.where(latest >= 0, trampled.by.passes[latest], 0.0)
     ground_mesh.write_shading(shown, own_data.PASSES, np.arange(len(passes)), passes)

@@ -14,6 +14,7 @@ from ...core.composers.playhead import Playhead
 from ...core.ground.display_blur import blurred_window, gaussian_kernel
 from ...core.ground.heightfield import HeightField
 from ...core.ground.sparse_grid import TILE, Window
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics import bilinear
 from ...core.numerics.slices import Slices
 from ...core.record import record
@@ -75,24 +76,27 @@ class LiveGround:
         Its display mesh carries no bake.
     unit_scale : float
         Metres per Blender unit.
+    frame : GroundFrame, optional
+        That the place is in.
     """
 
-    def __init__(self, place: Place, unit_scale: float) -> None:
+    def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> None:
         ground = settings.found(place.display_mesh)
         self._name = place.display_mesh
         self._vertices, self._place = place.index, place.position[:, :2]
-        self._up = ground_surface.up_of(ground, unit_scale)
+        self._up = ground_surface.up_of(ground, unit_scale, frame)
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
         self.take_from(ground)
 
-    def put_on(self, place: Place, unit_scale: float) -> bpy.types.Object:
+    def put_on(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> bpy.types.Object:
         """Show a place that has no prints yet; returns the ground."""
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
         empty, ground = np.empty(0, np.intp), settings.found(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        ground_mesh.write(ground, empty, nothing, no_prints, ground_surface.up_of(ground, unit_scale), shape_keys=False)
+        up = ground_surface.up_of(ground, unit_scale, frame)
+        ground_mesh.write(ground, empty, nothing, no_prints, up, shape_keys=False)
         shown = place.publish()
         self._name = settings.name_of(shown)
         return shown

@@ -266,7 +266,7 @@ class LiveMode:
         if made_with.carves and any(map(is_deep, footprints)):
             made_with = replace(made_with, carve=False)  # live mode carves nothing
         yield now
-        vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m)
+        vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m, made_with.frame)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
         shown = yield from jobs.meanwhile(now, pressing)
         looking = ground_surface.pressed_vertices.slices(vertices, shown.covers, shot.terrain)

@@ -47,7 +47,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         place = yield from _place(drafts, scene, wanted, known.shot)
         yield PRESSING
-        ground = LiveGround(place, wanted.unit_scale_m)
+        ground = LiveGround(place, wanted.unit_scale_m, wanted.frame)
         frame = float(scene.frame_current)
         while playhead.advance(frame):
             yield PRESSING
@@ -55,7 +55,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         yield from meanwhile(PRESSING, ground.updating(playhead, windows, sigma))
         yield PRESSING
         with analysis.own_changes(scene):
-            shown = ground.put_on(place, wanted.unit_scale_m)
+            shown = ground.put_on(place, wanted.unit_scale_m, wanted.frame)
             ground.show(shown, playhead, (), sigma, wanted.frame_rate)
     if wanted.ground is None:
         wanted, known = replace(wanted, ground=settings.name_of(shown)), analysis.read(scene)
@@ -70,7 +70,7 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
     InputError
         If the ground is too coarse and is to stay so.
     """
-    cell_size, unit_scale, detail = wanted.cell_size_m, wanted.unit_scale_m, wanted.detail
+    cell_size, unit_scale, detail, frame = wanted.cell_size_m, wanted.unit_scale_m, wanted.detail, wanted.frame
 
     def is_near(x: Array, y: Array) -> Mask:
         low, high = shot.lower, shot.upper
@@ -85,7 +85,7 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
 
     name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
     if vertices is None:  # it was made for the shot
-        vertices = ground_surface.rest_vertices(settings.found(name), unit_scale)
+        vertices = ground_surface.rest_vertices(settings.found(name), unit_scale, frame)
     plan = shot.plan or (yield from meanwhile(PLACING, plan_ground.slices(shot.motions)))
     if plan.footfalls is not None:
         footfalls = cells_at(plan.footfalls, cell_size)
@@ -98,9 +98,9 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
 
         under = yield from meanwhile(PLACING, ground_surface.pressed_vertices.slices(vertices, is_under, shot.terrain))
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
-            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
+            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame
         ):
-            coarse = yield from meanwhile(PLACING, trail_detail.surface_of.slices(ground, unit_scale))
+            coarse = yield from meanwhile(PLACING, trail_detail.surface_of.slices(ground, unit_scale, frame))
             region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
             refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
             drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.composers.edited_contacts import swapped
 from ...core.errors import InputError
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.rigid import rotation
 from ...core.record import record
 from ...core.record.contact_steps import PressingSole, Steps
@@ -126,11 +127,12 @@ class BakedStep(record.EditableStep):
 
 @dataclass(frozen=True, eq=False)
 class ShownBake:
-    """Steps of a bake in order, its footprints as they were left, and the reach of rims [m]."""
+    """Steps of a bake in order, its footprints as they were left, the reach of rims [m], and the frame of all that."""
 
     steps: Sequence[BakedStep] = ()
     footprints: Sequence[Footprint] = ()
     rim_reach: float = 0.0
+    frame: GroundFrame | None = None
 
 
 NOTHING = ShownBake()
@@ -149,7 +151,8 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
             steps = [
                 BakedStep(**vars(step), number=number, feet=soles) for number, step in enumerate(left.steps, start=1)
             ]
-            state.shown_bake = {key: ShownBake(steps, left.edited, baked_ground.baked_with(left.about, "rim_reach"))}
+            reach, frame = baked_ground.baked_with(left.about, "rim_reach"), baked_ground.frame_in(left.about["inputs"])
+            state.shown_bake = {key: ShownBake(steps, left.edited, reach, frame)}
     except InputError:
         return NOTHING
     shown: ShownBake = state.shown_bake[key]
@@ -159,6 +162,11 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
 def of(ground: bpy.types.Object | None) -> Sequence[BakedStep]:
     """The steps of the bake on the scene's ground, in their order; none where there is no bake that can be read."""
     return bake_on(ground).steps
+
+
+def frame_of(ground: bpy.types.Object | None) -> GroundFrame | None:
+    """The frame that these steps are in; None where that is the world's."""
+    return bake_on(ground).frame
 
 
 def chosen(ground: bpy.types.Object | None) -> list[BakedStep]:

@@ -13,6 +13,7 @@ from ...core.plants.tramplings import tramplings
 from .. import mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..operator_base import reports_errors
+from ..placement import hang_on
 from ..plants import give_way, meadow, trampling_table
 from ..translation import translated
 from ..weather.ground_weather import damage_named
@@ -92,12 +93,16 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
         ground = scene.softground.ground
         unit_scale = settings.units_of(scene).unit_scale_m
         shown = baked_ground.display_mesh_of(ground)
-        corners = ground_surface.rest_vertices(shown, unit_scale)[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
+        steps, about = baked_ground.load(ground) if baked_ground.is_baked(ground) else ([], {"inputs": {}})
+        frame = baked_ground.frame_in(about["inputs"])
+        vertices = ground_surface.rest_vertices(shown, unit_scale, frame)
+        corners = vertices[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
         if not len(corners):
             raise InputError(f"Ground '{ground.name}' has no faces that a meadow could grow on.")
-        steps = baked_ground.load(ground)[0] if baked_ground.is_baked(ground) else []
         near = np.array([step.position[:2] for step in steps]) if steps else None
         grass = meadow.grow(corners, unit_scale, near, _REACH)
+        if frame:
+            hang_on(grass, ground, frame)
         for collection in ground.users_collection:
             collection.objects.link(grass)
         _let(ground, [grass], "MEADOW")

@@ -37,7 +37,7 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         if not chosen:
             raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")
         for obj in chosen:
-            if fault := ground_checks.hard_fault(obj):
+            if fault := ground_checks.hard_fault(obj, options.ground):
                 raise InputError(fault)
         for obj in chosen:
             options.hard_grounds.add().object = obj

@@ -15,6 +15,7 @@ from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
+from ..placement import in_scene
 from ..state import state
 from . import baked_steps
 from .baked_steps import BakedStep
@@ -58,11 +59,17 @@ def is_free(area: Any) -> bool:
     return bool(space and space.region_3d.view_perspective == "PERSP" and not space.local_view)
 
 
-def centre(unit_scale: float, area: Any, step: BakedStep) -> None:
+def centre(area: Any, step: BakedStep) -> None:
     """Move the middle of the view in an area to a step; the view through a camera stays."""
     space = _viewport(area)
     if space and space.region_3d.view_perspective != "CAMERA":
-        space.region_3d.view_location = Vector(_middle(step).tolist()) / unit_scale
+        space.region_3d.view_location = _in_view(_middle(step))
+
+
+def _in_view(point: NDArray[np.float64]) -> Vector:
+    """A point of the bake [m] where the view shows it."""
+    scene: Any = bpy.context.scene
+    return Vector(in_scene(point, scene, baked_steps.frame_of(scene.softground.ground)).tolist())
 
 
 def _viewport(area: Any) -> Any:
@@ -99,8 +106,9 @@ def _show(prints: Sequence[BakedStep], area: Any, unit_scale: float) -> None:
     look = (prints[0].left or prints[0].baked).heading + ASIDE
     metre = 1.0 / unit_scale
     view, distance = space.region_3d, DISTANCE * reach * metre * space.lens / 50.0
+    at = _in_view(middle)
     view.view_perspective = "PERSP"
-    turn(area, Vector(middle) * metre + Vector((0.0, 0.0, RAISED * distance)), look, distance)
+    turn(area, at + Vector((0.0, 0.0, RAISED * distance)), look, distance)
     _light(space.shading, look)
 
 

@@ -44,13 +44,14 @@ def export_point_cache(ground: bpy.types.Object, path: Path, start: int, end: in
     display_mesh = baked_display_mesh(ground)
     rest = ground_mesh.rest_positions(ground_mesh.mesh_of(display_mesh))
     moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
-    world = ground_surface.rest_vertices(display_mesh, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
+    frame_of_bake = baked_ground.frame_in(about["inputs"])
+    world = ground_surface.rest_vertices(display_mesh, unit_scale, frame_of_bake)[moved]
     sigma = baked_ground.baked_with(about, "blur_sigma")
     x, y = world[:, :2].T
     relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
     over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
-    up = ground_surface.up_of(display_mesh, unit_scale)
+    up = ground_surface.up_of(display_mesh, unit_scale, frame_of_bake)
 
     def samples() -> Iterator[NDArray[np.float32]]:
         for frame in range(start, end + 1):

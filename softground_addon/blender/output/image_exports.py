@@ -16,6 +16,7 @@ from ...core.debris.fallout import Fallout
 from ...core.errors import InputError
 from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
+from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
@@ -92,7 +93,8 @@ def export_images(
     fallen = debris_object.at_rest(thrown, units) if thrown is not None else None
     if fallen is not None:
         reach = max(reach, _farthest(footprints, fallen.place))
-    pixels = _pixels(ground, units.unit_scale_m, footprints, reach, resolution, uv_map)
+    solved_in = baked_ground.frame_in(about["inputs"])
+    pixels = _pixels(ground, units.unit_scale_m, footprints, reach, resolution, uv_map, solved_in)
     # Last comes a place that no footprint reaches: as it is, so is all the ground around.
     far = max(((each.window.column + each.window.columns) * each.cell_size for each in footprints), default=0.0)
     position = np.append(pixels.position, [(far + 2 * reach, 0.0, 0.0)], axis=0)
@@ -165,6 +167,7 @@ def _pixels(
     reach: float,
     resolution: int,
     uv_map: str,
+    solved_in: GroundFrame | None,
 ) -> Pixels:
     """The pixels of the ground's UV map that lie near footprints, with their places."""
     with ground_surface.undisturbed_copy(ground) as mesh:
@@ -173,7 +176,7 @@ def _pixels(
         if layer is None:
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
-        to_world = ground_surface.to_world_of(ground, unit_scale)
+        to_world = ground_surface.to_world_of(ground, unit_scale, solved_in)
         surface = refined_mesh.surface_of(mesh_arrays.read_faces(mesh), to_world)
         name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)

@@ -16,6 +16,7 @@ from ...core.events.sound import SoundStep
 from ...core.files import files
 from .. import settings
 from ..ground import baked_ground
+from ..placement import in_scene
 
 
 def write(
@@ -79,13 +80,14 @@ def _seen_by_camera(scene: bpy.types.Scene, steps: Sequence[SoundStep]) -> list[
             f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make the sound "
             "without Stereo from Camera."
         )
-    unit = scene.unit_settings.scale_length
+    frame_of_bake = baked_ground.frame_in(baked_ground.load(scene.softground.ground)[1]["inputs"])
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []
     try:
         for step in steps:
             scene.frame_set(int(step.frame))
-            place = camera.matrix_world.inverted() @ Vector((step.position / unit).tolist())
+            here = in_scene(step.position, scene, frame_of_bake)
+            place = camera.matrix_world.inverted() @ Vector(here.tolist())
             seen.append((place.x, max(place.length, 1e-6)))
     finally:
         scene.frame_set(frame, subframe=subframe)

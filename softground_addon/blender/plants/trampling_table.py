@@ -14,6 +14,7 @@ from ...core.settings import SceneUnits
 from .. import compat
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import modifier_with
+from ..placement import hang_on
 from . import give_way_nodes as nodes
 
 NAME = "SoftGround Tramplings"
@@ -49,7 +50,7 @@ def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Trampling
     if trampled is not None:
         side = trampled.cell_size / units.unit_scale_m
         origin = trampled.origin / units.unit_scale_m
-        table.matrix_parent_inverse = ground.matrix_world.inverted()
+        hang_on(table, ground, units.frame)
         table.matrix_basis = Matrix.Translation((*origin, 0.0)) @ Matrix.Scale(side, 4)
 
 

@@ -31,6 +31,7 @@ from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..ground import ground_surface
+from ..ground.still_ground import mover_of
 from ..state import state
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
@@ -247,7 +248,10 @@ def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
-    """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers."""
+    """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers;
+    nothing of one that moves, which is told by hash."""
+    if mover_of(ground):
+        return []
     return [tuple(row) for row in ground_surface.placed_by_parents(ground) or ground.matrix_world]
 
 

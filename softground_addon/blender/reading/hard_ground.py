@@ -21,6 +21,7 @@ from ...core.settings import BakeSettings, ObjectName
 from .. import settings
 from ..ground import ground_checks, ground_surface
 from ..ground.baked_ground import display_mesh_of
+from ..placement import matrix_in
 from . import staleness
 
 Array = NDArray[np.float64]
@@ -44,17 +45,17 @@ def with_hard_objects(
     hard_parts : sequence of MeshTerrain
         What of the ground itself is hard.
     """
-    unit_scale, reach = wanted.unit_scale_m, reach_of(motions)
-    tops = yield from _tops(wanted.hard_grounds, unit_scale, bounds)
-    hard, wet = [*hard_parts, *(top for _, top in tops)], dict[str, MeshTerrain]()
+    reach = reach_of(motions)
+    listed_tops = yield from _tops(wanted.hard_grounds, wanted, bounds)
+    hard, wet = [*hard_parts, *(top for _, top in listed_tops)], dict[str, MeshTerrain]()
     liquids = dict(zip(wanted.hard_grounds, wanted.wet_grounds, strict=False))
     for liquid in sorted({*wanted.wet_grounds} - {""}):
-        pools = [top for name, top in tops if liquids[name] == liquid]
+        pools = [top for name, top in listed_tops if liquids[name] == liquid]
         wet |= {liquid: (yield from MeshTerrain.joined.slices(pools))} if pools else {}
     terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach, wet) if hard else ground
     raised = [rest for motion in motions for rest in raised_rests(motion, terrain)]
     yield
-    shown = yield from _tops(_still_meshes(scene, wanted, raised) if raised else (), unit_scale, bounds)
+    shown = yield from _tops(_still_meshes(scene, wanted, raised) if raised else (), wanted, bounds)
     carried = [(name, top, rests) for name, top in shown if (rests := carried_by(top.heights, raised, terrain))]
     if carried:
         hard += [top for _, top, _ in carried]
@@ -63,12 +64,12 @@ def with_hard_objects(
 
 
 def _tops(
-    names: Iterable[ObjectName], unit_scale: float, bounds: Array
+    names: Iterable[ObjectName], wanted: BakeSettings, bounds: Array
 ) -> Slices[list[tuple[ObjectName, MeshTerrain]]]:
     """The upper sides of objects within bounds in the plane, of those that have any."""
     tops = []
     for name in names:
-        surface = ground_surface.undisturbed_surface(settings.found(name), unit_scale)
+        surface = ground_surface.undisturbed_surface(settings.found(name), wanted.unit_scale_m, frame=wanted.frame)
         yield
         with suppress(InputError):  # nobody walks there
             tops.append((name, (yield from ground_surface.terrain_of.slices(surface, bounds))))
@@ -88,10 +89,10 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
             continue
         if not obj.visible_get(view_layer=scene.view_layers[0]):
             continue
-        world = np.array(obj.matrix_world)
+        world = matrix_in(wanted.frame, obj) if wanted.frame else np.array(obj.matrix_world)
         box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
         inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
-        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj):
+        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj, ground):
             still.append(settings.name_of(obj))
     return still
 

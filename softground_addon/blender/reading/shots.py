@@ -24,6 +24,7 @@ from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads
+from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping
 from ...core.settings import TIME_LIMIT, BakeSettings
@@ -43,7 +44,7 @@ from ..sampling.prop_extraction import check_props
 from ..sampling.rig_checks import check_rig
 from ..sampling.rig_sampling import sample_character, sample_prop
 from ..weather import ground_weather as weather
-from . import hard_ground
+from . import ground_frames, hard_ground
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,8 @@ class Shot:
         Of the characters that have one, where they are to respond.
     findings : tuple of Finding
         What the user should know of how it was read.
+    frame : GroundFrame or None
+        That all of this is in, instead of the world.
     """
 
     motions: tuple[CharacterMotion, ...]
@@ -78,6 +81,7 @@ class Shot:
     terrain: Terrain
     rigs: tuple[ReadRig, ...] = ()
     findings: tuple[Finding, ...] = ()
+    frame: GroundFrame | None = None
 
     @property
     def skins(self) -> dict[str, WornSkin]:
@@ -141,9 +145,9 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 "the same one."
             )
     for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.found(name)):
+        if fault := ground_checks.hard_fault(settings.found(name), ground):
             raise InputError(fault)
-    return wanted
+    return ground_frames.framed(scene, wanted)
 
 
 def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
@@ -160,11 +164,12 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
         terrain, missing = yield from _with_hard(scene, wanted, motions, plan.terrain, np.stack([lower, upper]))
-        return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing))
+        return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
     yield Progress("sample", 1.0)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
-    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, wanted.kinds[1])
+    of_slots = wanted.kinds[1]
+    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
     surface = yield from meanwhile(Progress("sample", 1.0), looking)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
@@ -174,7 +179,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
     hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
     terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
-    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing))
+    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing), wanted.frame)
 
 
 def _with_hard(
@@ -262,7 +267,8 @@ def sample_characters(
             job = sample_prop(
                 scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=units, findings=findings
             )
-        motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
+        motion = yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))
+        motions.append(replace(motion, ride=wanted.frame.ride) if wanted.frame else motion)
         if poses:
             rigs.append(ReadRig(controls, poses))
     return motions, tuple(rigs)

@@ -13,11 +13,12 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.files import report
-from ...core.settings import Acts, BakeSettings, CharacterSettings
+from ...core.settings import DOWN, Acts, BakeSettings, CharacterSettings
 from .. import ground_slots, settings
 from ..compat import SERIES
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..ground.baked_ground import display_mesh_of
+from ..ground.still_ground import mover_of
 from ..plants import trampling_table
 from ..playback import playback, weather_modifier
 from ..playback.own_data import FINGERPRINTS
@@ -200,7 +201,8 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole = {"marks": True, "carve": True, "hard_grounds": (), "wet_grounds": (), "regions": (), **inputs}
+    whole: dict[str, Any] = {"marks": True, "carve": True, "hard_grounds": (), "wet_grounds": (), "regions": ()}
+    whole |= {"gravity_direction": DOWN, **inputs}
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
@@ -222,7 +224,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 def _of_standing(ground: bpy.types.Object) -> str:
     """Where the ground is, told without having Blender evaluate anything: it calls the handlers, which ask this."""
     matrix = ground_surface.placed_by_parents(ground)
-    if matrix is None:
+    if matrix is None or mover_of(ground):
         return f"{input_hashes.of_place([ground, *ancestors(ground)])}{_of_movement(ground, None)}"
     place = np.round(np.array(matrix, dtype=np.float64), 6) + 0.0  # no negative zeros
     return f"{zlib.crc32(place.tobytes()):08x}"

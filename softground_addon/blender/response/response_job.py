@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...core.composers.responses import CharacterResponse, worst_gaps
 from ...core.errors import InputError
@@ -26,7 +27,11 @@ from ..animation_layer.constraint_layer import (
 )
 from ..animation_layer.layer_curves import LayerCurve
 from ..jobs import Job, counted
+from ..placement import world_matrix
 from .character_keys import ReadRig, controls_of, response_curves
+
+ROUNDED = 2e-3
+"""Rounding of places from which feet would jump about, in units of the armature."""
 
 SHARE_OF_WRITING = 0.1
 """Part of a bake's last stage in which the layers are worked out."""
@@ -49,6 +54,12 @@ def check_characters(characters: Iterable[CharacterSettings]) -> None:
     """Raise InputError, naming the remedy, where a character can take no layer."""
     for _, armature in rigged(characters):
         check_layerable(armature)
+        far = float(np.abs(world_matrix(armature)[:3, 3]).max())
+        if (step := float(np.spacing(np.float32(far)))) > ROUNDED * armature.matrix_world.median_scale:
+            raise InputError(
+                f"'{armature.name}' is so far from the world's origin that Blender rounds what constraints do to its "
+                f"bones to {step:.2g} units: move the shot to the origin, and the feet can be put on the ground."
+            )
 
 
 def _refusal(view_layer: bpy.types.ViewLayer, characters: Sequence[CharacterSettings]) -> str:

@@ -14,7 +14,10 @@ from itertools import combinations
 import bpy
 import numpy as np
 
+from ...core.motion.ground_frame import upright
 from ...core.numerics.arrays import Array
+from ..placement import felt_gravity
+from ..settings import gravity_direction_of
 
 Joints = dict[str, tuple[str, str]]
 Feet = list[tuple[str, str, str, str]]
@@ -230,6 +233,8 @@ def _read_skeleton(armature: bpy.types.Object, *, posed: bool = False) -> _Skele
     index = {bone.name: place for place, bone in enumerate(deforming)}
     parents = [next((index[p.name] for p in bone.parent_recursive if p.name in index), -1) for bone in deforming]
     turn = np.array(armature.matrix_world.to_3x3())
+    for scene in armature.users_scene[:1]:
+        turn = upright(-np.array(felt_gravity(gravity_direction_of(scene), [armature]))) @ turn
     if np.linalg.det(turn) < 0:
         turn = turn * (-1, 1, 1)  # sides are those of the character, not of its mirror image
     names = [bone.name for bone in deforming]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..animation_layer.constraint_layer import is_own
+from ..placement import beside
 from ..settings import Objects
 
 Array = NDArray[np.float64]
@@ -80,12 +81,12 @@ def carriers(rig: bpy.types.Object, body: bpy.types.Object) -> dict[str, tuple[s
     Bones that follow none go with those that they hang on.
     """
     leads, carrying = _leads(body, rig), {}
-    beside = np.array(body.matrix_world.inverted_safe() @ rig.matrix_world)
+    in_body = beside(rig, body)
     for bone in rig.pose.bones:
         for node in (bone, *bone.parent_recursive):
             if (held := _held(node, leads)) is not None:
                 kind, name = held[0], leads[held[1]]
                 lies = body.data.bones[name].matrix_local @ node.bone.matrix_local.inverted()
-                carrying[bone.name] = name, np.array(lies) if kind in _COPIES else beside
+                carrying[bone.name] = name, np.array(lies) if kind in _COPIES else in_body
                 break
     return carrying

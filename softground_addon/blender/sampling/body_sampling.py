@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.bare_body import BareBody, bare_body, body_motion, recorded
 from ...core.rig.mapping import RigMapping
 from ...core.rig.recording import Recording, SceneUnits
 from ...core.settings import ObjectName
 from .. import mesh_arrays
+from ..placement import units_about, world_matrix
 from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import parts_of
@@ -80,7 +82,7 @@ def read_body(
     first, last = body_frames(scene, body)
     poses = np.unique(np.linspace(first, last, POSES).round().astype(int)).tolist()
     objects = [mesh.name_full for mesh in meshes_of(body)]
-    positions, counts, triangles = yield from _positions(scene, objects, poses)
+    positions, counts, triangles = yield from _positions(scene, objects, poses, None, units_about(scene, body).frame)
     if not len(triangles):
         raise InputError(f"'{name.name}' has no faces to print with: give its mesh faces, or select another object.")
     return (yield from bare_body.slices(positions, triangles, list(zip(objects, counts, strict=True)), known))
@@ -91,7 +93,7 @@ def record_body(
 ) -> Generator[int, None, Recording]:
     """Poses of the parts of a body over time; yields the number of frames read, and raises as `read_body` does."""
     objects = [mesh.name_full for mesh in meshes_of(found(name))]
-    positions, counts, _ = yield from _positions(scene, objects, frames, body.followed)
+    positions, counts, _ = yield from _positions(scene, objects, frames, body.followed, units.frame)
     if sum(counts) != len(body.skin.vertices):
         raise InputError(f"The meshes of '{name.name}' were changed while they were read: try again.")
     return recorded(body, positions, frames, units)
@@ -135,10 +137,14 @@ def sample_body(
 
 
 def _positions(
-    scene: bpy.types.Scene, objects: Sequence[str], frames: Sequence[int], chosen: NDArray[np.intp] | None = None
+    scene: bpy.types.Scene,
+    objects: Sequence[str],
+    frames: Sequence[int],
+    chosen: NDArray[np.intp] | None = None,
+    frame_of_ground: GroundFrame | None = None,
 ) -> Generator[int, None, tuple[NDArray[np.float32], list[int], NDArray[np.intp]]]:
-    """World positions (F, V, 3) of vertices of some objects, or of the `chosen` ones [Blender units]; the number of
-    vertices of each object, and all triangles (T, 3)."""
+    """Positions (F, V, 3) of vertices of some objects, or of the `chosen` ones, in the world or a ground's frame
+    [Blender units]; the number of vertices of each object, and all triangles (T, 3)."""
     rows: list[NDArray[np.float32]] = []
     counts: list[int] = []
     with sampling_scene(scene, "", (), (), meshes=objects) as temporary:
@@ -150,6 +156,8 @@ def _positions(
             pieces, triangles, first = [], [], 0
             for evaluated in (object_named(obj).evaluated_get(depsgraph) for obj in objects):
                 matrix, mesh = np.array(evaluated.matrix_world), mesh_of(evaluated)
+                if frame_of_ground:
+                    matrix = frame_of_ground.from_world([frame])[0] @ world_matrix(evaluated)
                 pieces.append(mesh_arrays.positions(mesh) @ matrix[:3, :3].T + matrix[:3, 3])
                 if not rows:
                     triangles.append(mesh_arrays.triangles(mesh) + first)

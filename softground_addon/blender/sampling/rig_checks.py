@@ -84,7 +84,8 @@ def is_animated(armature: bpy.types.Object) -> bool:
 
 
 def check_finite(name: str, recording: Recording) -> None:
-    for matrices in chain([recording.armature], map(recording.bone, recording.bones), recording.props.values()):
+    of_rig = [recording.armature] if recording.bones else []
+    for matrices in chain(of_rig, map(recording.bone, recording.bones), recording.props.values()):
         furthest = np.abs(matrices).max(axis=(1, 2))
         bad = ~(furthest <= _FARTHEST)
         if not bad.any():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import nullcontext
+from operator import attrgetter
 from typing import Any
 
 import bpy
@@ -12,6 +13,7 @@ import numpy as np
 from ...core.findings import Finding
 from ...core.rig.recording import Recording, SceneUnits
 from ..animation_layer.constraint_layer import LayerKind, without_layers
+from ..placement import world_matrix
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .rig_checks import check_finite
@@ -72,6 +74,7 @@ def _checked(name: str, recording: Recording, findings: list[Finding] | None) ->
     """The recording, which must be finite; `findings` take that handlers of others moved it."""
     if findings is not None:
         findings.append(handled_finding(name))
+    recording = recording.in_frame()
     check_finite(name, recording)
     return recording
 
@@ -122,6 +125,7 @@ def _evaluate(
 
     `handled` lets frame handlers of others act.
     """
+    placed = world_matrix if units.frame else attrgetter("matrix_world")
     poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
     prop_matrices = np.empty((len(frames), len(props), 4, 4))
     values = np.empty((len(shapes), len(frames)))
@@ -143,7 +147,7 @@ def _evaluate(
                 assert depsgraph is not None
                 if armature:
                     evaluated = object_named(armature).evaluated_get(depsgraph)
-                    armature_matrices[done] = evaluated.matrix_world
+                    armature_matrices[done] = placed(evaluated)
                     pose = evaluated.pose.bones
                     if done == 0:
                         places = [pose.find(bone) for bone in bones]
@@ -151,7 +155,7 @@ def _evaluate(
                     pose.foreach_get("matrix", buffer.reshape(-1))
                     poses[done] = buffer[places]
             for place, obj in enumerate(props):
-                prop_matrices[done, place] = object_named(obj).evaluated_get(depsgraph).matrix_world
+                prop_matrices[done, place] = placed(object_named(obj).evaluated_get(depsgraph))
             for place, (obj, key) in enumerate(shapes):
                 keys = object_named(obj).data.shape_keys.evaluated_get(depsgraph)
                 values[place, done] = keys.key_blocks[key].value

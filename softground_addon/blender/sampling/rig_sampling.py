@@ -25,8 +25,9 @@ from ...core.rig.skin_stances import LONGEST, skin_stances
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
 from ..kept import kept
+from ..placement import units_about
 from ..rigs.rig_mapping import rest_bones
-from ..settings import found, name_of, units_of
+from ..settings import found, name_of
 from .control_poses import RigPoses
 from .prop_extraction import check_props, read_prop
 from .rig_checks import check_frames, check_mass, check_recording, check_rig
@@ -98,7 +99,7 @@ def sample_character(
     if on_bones and meshes_on(scene.objects, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
         armature = found(rig)
-    units = units or units_of(scene)
+    units = units or units_about(scene, armature)
     bones += skin.bones if skin and len(frames) <= LONGEST else ()
     shapes = [shape.key for shape in skin.shapes] if skin else []
     recording = yield from record(scene, armature, frames, bones, units, props, shapes, below=below, findings=findings)

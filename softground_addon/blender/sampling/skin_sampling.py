@@ -14,6 +14,7 @@ from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
 from ...core.rig.rig_skin import RigSkin, Shape
 from .. import mesh_arrays
+from ..placement import beside
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
 from ..settings import ObjectName, Objects, found, name_of
@@ -211,7 +212,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
     used, group = np.unique(group, return_inverse=True)
     total = np.bincount(vertex, weight, count)
     held = total[vertex] > _LEAST_WEIGHT
-    to_armature = np.array(armature.matrix_world.inverted_safe() @ found(placed).matrix_world)
+    to_armature = beside(found(placed), armature)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
         mesh_arrays.triangles(mesh),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import bpy
@@ -16,6 +17,7 @@ from .. import jobs, session, settings
 from ..live import live
 from ..operators import baked_steps, prediction
 from ..operators.modal_job import Reading, ReadingShot
+from ..placement import in_scene
 from ..reading import analysis
 from ..reading.analysis import Analysis
 from ..state import state
@@ -67,22 +69,22 @@ def draw_shapes() -> None:
 
     scene = settings.scene_of(context)
     frame = float(scene.frame_current)
-    metre = 1.0 / scene.unit_settings.scale_length
+    place = partial(in_scene, scene=scene, frame=known.shot.frame)
     gpu.state.blend_set("ALPHA")
     try:
         if panel.show_cells:
             contact, rim, size = _cells(scene)
             for cells, colour in ((contact, CONTACT), (rim, RIM)):
-                _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
+                _fill(place(overlay_shapes.squares(cells, size, known.shot.terrain)), colour)
         if panel.show_footfalls:
             for outline in _footfalls(known):
-                draw_line(closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
+                draw_line(place(closed(outline.points)), _faded(SIDES[outline.side], 0.8), LINE)
         if panel.show_soles:
             for outline in overlay_shapes.soles(known.loads, frame):
-                draw_line(closed(outline.points) * metre, SIDES[outline.side], BOLD_LINE)
+                draw_line(place(closed(outline.points)), SIDES[outline.side], BOLD_LINE)
         if panel.show_forces:
             for arrow in overlay_shapes.arrows(known.loads, frame):
-                _arrow(arrow.start * metre, arrow.end * metre, FORCES[arrow.kind])
+                _arrow(place(arrow.start), place(arrow.end), FORCES[arrow.kind])
     finally:
         gpu.state.blend_set("NONE")
 
@@ -118,12 +120,12 @@ def draw_numbers() -> None:
     import blf  # noqa: PLC0415
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
-    metre = 1.0 / settings.scene_of(context).unit_settings.scale_length
     blf.size(0, TEXT_SIZE * context.preferences.system.ui_scale)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
     for number, outline in enumerate(_footfalls(known), start=1):
-        place = location_3d_to_region_2d(context.region, context.region_data, Vector((outline.middle * metre).tolist()))
+        middle = in_scene(outline.middle, settings.scene_of(context), known.shot.frame)
+        place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
         if place is None:
             continue
         text = f"{number}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -20,6 +21,7 @@ from ..baking.step_preview import StepPreview
 from ..ground import baked_ground
 from ..operators import baked_steps
 from ..operators.baked_steps import BakedStep
+from ..placement import from_scene, in_scene
 from ..state import state
 from ..translation import translated
 from . import overlay
@@ -233,10 +235,12 @@ def _on_plane(region: Any, view: Any, event: bpy.types.Event, height: float) -> 
     """Place on a level plane that the mouse points at, (2,) [m]; None where it points past it."""
     from bpy_extras import view3d_utils  # noqa: PLC0415
 
-    metre = float(bpy.context.scene.unit_settings.scale_length)
+    scene: Any = bpy.context.scene
+    frame = baked_steps.frame_of(scene.softground.ground)
     at = (event.mouse_x - region.x, event.mouse_y - region.y)
-    origin = np.array(view3d_utils.region_2d_to_origin_3d(region, view, at)) * metre
-    toward = np.array(view3d_utils.region_2d_to_vector_3d(region, view, at))
+    eye = np.array(view3d_utils.region_2d_to_origin_3d(region, view, at))
+    origin = from_scene(eye, scene, frame)
+    toward = from_scene(eye + view3d_utils.region_2d_to_vector_3d(region, view, at), scene, frame) - origin
     if abs(toward[2]) < 1e-4:
         return None
     along = (height - origin[2]) / toward[2]
@@ -264,11 +268,11 @@ def _within(box: Sequence[tuple[int, int]], steps: Sequence[BakedStep], region: 
     """Ids of the steps whose middles are seen within a box, two of its corners being given [px]."""
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
-    metre = 1.0 / bpy.context.scene.unit_settings.scale_length
+    scene: Any = bpy.context.scene
     low, high = np.min(box, axis=0), np.max(box, axis=0)
     names = []
     for step in steps:
-        middle = step.outline().mean(axis=0) * metre
+        middle = in_scene(step.outline().mean(axis=0), scene, baked_steps.frame_of(scene.softground.ground))
         place: Any = location_3d_to_region_2d(region, view, Vector(middle.tolist()))
         if place is not None and (low <= place[:]).all() and (place[:] <= high).all():
             names.append(step.name)
@@ -280,7 +284,7 @@ def draw_outlines() -> None:
     context: Any = bpy.context
     if context.scene is None or not (state.picking or session.current().step):
         return
-    metre = 1.0 / context.scene.unit_settings.scale_length
+    place = partial(in_scene, scene=context.scene, frame=baked_steps.frame_of(context.scene.softground.ground))
     import gpu  # noqa: PLC0415  (not there in background)
 
     gpu.state.blend_set("ALPHA")
@@ -288,7 +292,7 @@ def draw_outlines() -> None:
         for step, edit, is_chosen in _outlined(context.scene.softground.ground):
             width = overlay.BOLD_LINE if is_chosen else overlay.LINE
             colour = overlay.SIDES.get(step.side, overlay.SIDES[""])
-            overlay.draw_line(overlay.closed(step.outline(edit)) * metre, colour, width)
+            overlay.draw_line(place(overlay.closed(step.outline(edit))), colour, width)
     finally:
         gpu.state.blend_set("NONE")
 
@@ -301,10 +305,10 @@ def draw_numbers() -> None:
     import blf  # noqa: PLC0415
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
-    metre = 1.0 / context.scene.unit_settings.scale_length
     blf.size(0, overlay.TEXT_SIZE * context.preferences.system.ui_scale)
-    for step, edit, _ in _outlined(context.scene.softground.ground):
-        middle = step.outline(edit).mean(axis=0) * metre
+    ground = context.scene.softground.ground
+    for step, edit, _ in _outlined(ground):
+        middle = in_scene(step.outline(edit).mean(axis=0), context.scene, baked_steps.frame_of(ground))
         place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
         if place is not None:
             blf.position(0, place.x, place.y, 0)

@@ -34,6 +34,7 @@ from ..operator_base import OnBake
 from ..operators import baked_steps, show_prints
 from ..operators.baked_steps import BakedStep
 from ..operators.modal_job import STAGE_NAMES, ModalJob
+from ..placement import from_scene
 from ..reading import analysis
 from ..translation import translated
 
@@ -161,7 +162,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
             session.choose_steps(step.name)
         if step.name in session.chosen_steps():
             scene.frame_set(step.there_from)
-            show_prints.centre(scene.unit_settings.scale_length, context.area, step)
+            show_prints.centre(context.area, step)
         session.redraw()
         session.redraw(region_type="WINDOW")
         return {"FINISHED"}
@@ -328,7 +329,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
 
     def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
         step = self.chosen(scene)[0]
-        cursor = np.array(scene.cursor.location)[:2] * scene.unit_settings.scale_length
+        cursor = from_scene(np.array(scene.cursor.location), scene, baked_steps.frame_of(scene.softground.ground))[:2]
         edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
         shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
         if abs(shift) > LONGEST_SHIFT:

@@ -148,7 +148,7 @@ def _fit(
         (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
         first, last = (frame * units.time_stretch for frame in baked_ground.frames_of(inputs))
         rate = units.frame_rate * units.time_stretch
-    up = ground_surface.up_of(display_mesh, units.unit_scale_m)
+    up = ground_surface.up_of(display_mesh, units.unit_scale_m, units.frame)
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate)
     mesh = ground_mesh.mesh_of(display_mesh)
@@ -195,11 +195,11 @@ def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mappin
     display_mesh = baked_ground.display_mesh_of(ground)
     with damage_named(ground):
         (known, _), unit_scale = of_bake(footprints, about), baked_ground.unit_of(about["inputs"], "unit_scale_m")
-    name = settings.name_of(display_mesh)
-    position = ground_surface.undisturbed_surface(display_mesh, unit_scale).vertices
+    name, frame = settings.name_of(display_mesh), baked_ground.frame_in(about["inputs"])
+    position = ground_surface.undisturbed_surface(display_mesh, unit_scale, frame=frame).vertices
     yield READING
     display_mesh = settings.found(name)
-    mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale)
+    mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale, frame)
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
     relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)
     start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))

@@ -99,7 +99,7 @@ def weathered_points(
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))
-        up = ground_surface.up_of(display_mesh, unit_scale)
+        up = ground_surface.up_of(display_mesh, unit_scale, baked_ground.frame_in(about["inputs"]))
 
         with _looking_up(modifier.node_group, hollows) as group:
 

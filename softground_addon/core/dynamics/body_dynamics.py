@@ -133,7 +133,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
         smooth, rate, acceleration = smooth_path(
             path, motion.time_step, _last_pass(points, cutoff, frame_step), sampled=sampled, steady_ends=STEADY_ENDS
         )
-        force = acceleration[:, 3:] / motion.fall + (0.0, 0.0, 1.0)
+        force = acceleration[:, 3:] / motion.fall + motion.upward(smooth[:, 3:], rate[:, 3:])
         return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.fall, points, cutoff)
 
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
@@ -177,10 +177,10 @@ def with_flight(
         # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
         for _ in range(MOST_ROUNDS):
             falling = _inner(flying) | pulled
-            centre, _, acceleration = smooth_path(
+            centre, velocity, acceleration = smooth_path(
                 path, motion.time_step, low_pass, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
             )
-            force = acceleration / fall + (0.0, 0.0, 1.0)
+            force = acceleration / fall + motion.upward(centre, velocity)
             pulling = ~airborne & (force[:, 2] < 0)
             if (pulling == pulled).all():
                 break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,24 @@ class CameraView:
     corners: tuple[tuple[Place, Place], ...]
     eyes: tuple[Place, ...]
     pixels_per_radian: float
+
+    def moved(self, matrix: Array) -> CameraView:
+        """The same view from elsewhere: in the frame to which a matrix (4, 4) leads [m]."""
+        turn, shift = matrix[:3, :3], matrix[:3, 3]
+
+        def place(point: Place) -> Place:
+            x, y, z = (turn @ point + shift).tolist()
+            return x, y, z
+
+        def ray(direction: Place) -> Place:
+            x, y, z = (turn @ direction).tolist()
+            return x, y, z
+
+        return replace(
+            self,
+            corners=tuple((place(origin), ray(direction)) for origin, direction in self.corners),
+            eyes=tuple(map(place, self.eyes)),
+        )
 
     def reach(self, height: float) -> Array:
         """Where the corners of the picture lie on level ground, (N, 2) [m]; far away for those above the horizon.

@@ -83,7 +83,9 @@ def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_t
     share = share_by_moment(pressure[..., :2], centre_of_mass(motion)[:, :2], contacts.touching)
     share = np.where(contacts.touching, np.maximum(share, RESTING_FRACTION), 0.0)
     share /= np.maximum(share.sum(axis=1, keepdims=True), RESTING_FRACTION)
-    weight = share * motion.mass * motion.gravity
+    centre = centre_of_mass(motion)
+    upward = np.maximum(motion.upward(centre, np.gradient(centre, motion.time_step, axis=0))[..., 2], 0.0)
+    weight = share * motion.mass * motion.gravity * np.reshape(upward, (-1, 1))
     momentum = share * motion.mass * _landing_deceleration(motion, contacts, characteristic_time)
     forces = (weight + momentum)[..., None] * UP
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, momentum)

@@ -107,7 +107,9 @@ def free_loads(
         lasting=max(1, round(characteristic_time / fine.time_step)),
         landing_only=force_model == "IMPULSE",
     )
-    weight = motion.mass * motion.gravity * UP * shown.any(axis=1)[:, None]
+    assert fine.centre is not None
+    upward = fine.upward(fine.centre, np.gradient(fine.centre, fine.time_step, axis=0)) if fine.ride else UP
+    weight = motion.mass * motion.gravity * upward * shown.any(axis=1)[:, None]
     total = weight + motion.mass * pushed
     total[total[:, 2] <= 0] = 0.0
     along = np.arange(len(fine.frames)) / steps

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..numerics.arrays import Array
 from ..numerics.interpolation import cubic, linear
+from .ground_ride import GroundRide
 from .people import has_two_legs
 from .sole_motion import SoleMotion, _between, shortest_length
 from .units import scale_to_metres
@@ -81,6 +82,9 @@ class LowSkin:
     on_the_spot: bool = False
 
 
+UP = np.array([0.0, 0.0, 1.0])
+
+
 @dataclass(frozen=True)
 class CharacterMotion:
     """Everything the core knows about one character.
@@ -116,6 +120,8 @@ class CharacterMotion:
         Largest extent of its bones at rest [m]; 0 without a rig.
     bones_move : bool
         True if some bone that was read moves, though it may carry no joint and no sole: a head that nods.
+    ride : GroundRide or None
+        Of the ground, in whose frame all of this is, where that moves.
     """
 
     name: str
@@ -133,6 +139,7 @@ class CharacterMotion:
     stature: float = 0.0
     size: float = 0.0
     bones_move: bool = False
+    ride: GroundRide | None = None
 
     @property
     def times(self) -> Array:
@@ -148,6 +155,10 @@ class CharacterMotion:
     def fall(self) -> float:
         """Gravity in the units of its file, as its stature tells them [m/s²]: one in centimetres moves as in metres."""
         return self.gravity / scale_to_metres(self.stature)
+
+    def upward(self, centre: Array, velocity: Array) -> Array:
+        """What carries the body at each sample, at places [m] with velocities [m/s], per weight: (3,) or (F, 3)."""
+        return self.ride.upward(self.frames, centre, velocity) if self.ride else UP
 
     @property
     def two_legs(self) -> bool:

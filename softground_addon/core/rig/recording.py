@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..motion.ground_frame import GroundFrame
 from ..numerics.arrays import Array
 
 _STILL = 1e-4
@@ -24,17 +25,20 @@ class SceneUnits:
         Scene frames per second [Hz].
     time_stretch : float
         Frames of the animation per frame of the scene.
+    frame : GroundFrame or None
+        In which a bake is read and solved; None where that is the world's.
     """
 
     frame_rate: float
     time_stretch: float
     gravity_m_s2: float
     unit_scale_m: float
+    frame: GroundFrame | None = field(default=None, kw_only=True, metadata={"said_if_on": True, "acts": 5})
 
     @property
     def units(self) -> SceneUnits:
         """These alone, without the settings that they are part of."""
-        return SceneUnits(self.frame_rate, self.time_stretch, self.gravity_m_s2, self.unit_scale_m)
+        return SceneUnits(self.frame_rate, self.time_stretch, self.gravity_m_s2, self.unit_scale_m, frame=self.frame)
 
 
 @dataclass(frozen=True)
@@ -49,9 +53,9 @@ class Recording:
     poses : (F, bones, 4, 4) float32 array
         Transposed matrices of the bones in the armature's space, as Blender gives them [Blender units].
     world : (F, 4, 4) float array
-        Of the armature [Blender units].
+        Of the armature, to the frame that it is solved in [Blender units].
     props : mapping of str to (F, 4, 4) float array
-        World matrices of the objects by their names [m].
+        Matrices of the objects to that frame, by their names [m].
     units : SceneUnits
         What frames and Blender units come to.
     shapes : mapping of (object, shape key) to (F,) float array
@@ -91,6 +95,16 @@ class Recording:
             props={name: matrices[samples] for name, matrices in self.props.items()},
             shapes={key: values[samples] for key, values in self.shapes.items()},
         )
+
+    def in_frame(self) -> Recording:
+        """What was read in the world, as seen in the frame that it is solved in."""
+        if self.units.frame is None:
+            return self
+        turn = self.units.frame.from_world(self.frames)
+        in_metres = turn.copy()
+        in_metres[:, :3, 3] *= self.units.unit_scale_m
+        props = {name: in_metres @ matrices for name, matrices in self.props.items()}
+        return replace(self, world=turn @ self.world, props=props)
 
     def _in_metres(self, matrices: Array) -> Array:
         matrices[..., :3, :] *= self.units.unit_scale_m

@@ -5,7 +5,6 @@ import pytest
 
 from softground_addon.blender.compat import HAS_SLOTS, set_slot, slot_of
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.core.errors import InputError
 from tests.blender.grounds import bake, plane
 
 
@@ -23,10 +22,15 @@ def rig_of(scene):
     return scene.softground.characters[0].armature
 
 
-@pytest.mark.parametrize("direction", [(0, -9.81, 0), (0, 0, 9.81), (1.0, 0, -9.7)])
-def test_gravity_that_points_elsewhere_is_said(short_walk, direction):
+@pytest.mark.parametrize("direction", [(0, -9.81, 0), (0, 0, 9.81)])
+def test_gravity_in_which_nobody_stands_is_said(short_walk, direction):
     short_walk.gravity = direction
     assert "Gravity of scene 'Scene' points along" in finding(short_walk, "gravity_direction")["message"]
+
+
+def test_gravity_that_points_into_a_slope_says_nothing(short_walk):
+    short_walk.gravity = (1.0, 0, -9.7)
+    assert "gravity_direction" not in {one["code"] for one in bake(short_walk).report["self_check"]}
 
 
 def test_gravity_that_is_switched_off_or_weak_points_nowhere_else(short_walk):
@@ -46,15 +50,18 @@ def test_a_walk_so_far_from_the_origin_that_cells_are_rounded_away_is_said(short
     codes = {one["code"]: one["message"] for one in bake(short_walk, ground=ground).report["self_check"]}
     assert ("far_from_origin" in codes) == said
     if said:
-        assert "548 km from the world's origin, where Blender rounds positions to 6.2 cm" in codes["far_from_origin"]
+        shown = "548 km from the world's origin, where Blender shows positions rounded to 6.2 cm"
+        assert shown in codes["far_from_origin"]
 
 
-def test_a_place_on_a_map_is_no_broken_key(short_walk):
-    rig_of(short_walk).location = (548_000, 5_932_000, 0)
-    with pytest.raises(
-        InputError, match=r"is 5,932 km from the world's origin.*rounds positions to 50 cm: move it and"
-    ):
-        bake(short_walk)
+def test_a_walk_keyed_in_coordinates_of_a_map_is_rounded_with_a_remedy(short_walk):
+    rig = rig_of(short_walk)
+    for frame, north in ((1, 5_932_000), (30, 5_932_002)):
+        rig.location = (548_000, north, 0)
+        rig.keyframe_insert("location", frame=frame)
+    said = finding(short_walk, "far_from_origin")
+    assert "rounds positions to 50 cm, and keys or constraints move 'Walker' there" in said["message"]
+    assert "Parent it to an empty" in said["remedy"]
 
 
 def strips(rig, *, at):

@@ -1,0 +1,121 @@
+"""Where objects are in the frame of a bake, in double precision as far as Blender's own values go: its matrices round
+far from the origin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ..core.motion.ground_frame import ALIGNED, GroundFrame
+from ..core.rig.recording import SceneUnits
+from ..core.settings import DOWN
+from . import settings
+
+Array = NDArray[np.float64]
+Direction = tuple[float, float, float]
+
+FAR = 1000.0
+"""What is farther from the world's origin has a frame of its own [m]: single precision rounds to 0.06 mm there."""
+UP = (0.0, 0.0, 1.0)
+LEANING = 0.25
+"""A body stands where the middle of its bones is so far above its origin, as a part of their distance."""
+TINY = 1e-9
+
+
+def world_matrix(obj: bpy.types.Object) -> Array:
+    """Object space to the world, (4, 4) [Blender units]; rounded where constraints, physics or bones have a say."""
+    parent, body = obj.parent, obj.rigid_body
+    if any(not constraint.mute for constraint in obj.constraints) or (body and body.type == "ACTIVE"):
+        return np.array(obj.matrix_world, dtype=np.float64)
+    basis = np.array(obj.matrix_basis, dtype=np.float64)
+    if parent is None:
+        return basis
+    if obj.parent_type != "OBJECT" or (parent.type == "CURVE" and parent.data.use_path):
+        return np.array(obj.matrix_world, dtype=np.float64)
+    return np.asarray(world_matrix(parent) @ np.array(obj.matrix_parent_inverse) @ basis)
+
+
+def beside(obj: bpy.types.Object, other: bpy.types.Object) -> Array:
+    """Space of an object to that of another one, (4, 4), also where Blender's own matrices round."""
+    place = world_matrix(other)
+    if np.abs(place[:3, 3]).max() <= FAR:
+        return np.array(other.matrix_world.inverted_safe() @ obj.matrix_world)
+    return np.asarray(np.linalg.pinv(place) @ world_matrix(obj))
+
+
+def still_frame(place: Array, units: SceneUnits, direction: Direction) -> GroundFrame | None:
+    """The frame of what stands still at a place (4, 4) in the world [Blender units], where gravity has a direction;
+    None where the world's own would do."""
+    up = -np.array(direction)
+    if np.abs(place[:3, 3]).max() * units.unit_scale_m <= FAR and np.linalg.norm(up - UP) <= ALIGNED:
+        return None
+    return GroundFrame.still(place, up)
+
+
+def felt_gravity(direction: Direction, bodies: Iterable[bpy.types.Object]) -> Direction:
+    """Where gravity points for some bodies: as the scene's does, unless they all stand upright in another one."""
+    rigs = [body for body in bodies if body.type == "ARMATURE" and body.data.bones]
+    if direction == DOWN or not rigs:
+        return direction
+    return direction if any(_above_origin(rig) @ direction < -LEANING for rig in rigs) else DOWN
+
+
+def _above_origin(rig: bpy.types.Object) -> Array:
+    """Unit vector in the world from the origin of a rig to the middle of its bones at rest."""
+    heads = np.empty(len(rig.data.bones) * 3)
+    rig.data.bones.foreach_get("head_local", heads)
+    toward = world_matrix(rig)[:3, :3] @ heads.reshape(-1, 3).mean(axis=0)
+    return np.asarray(toward / max(float(np.linalg.norm(toward)), TINY))
+
+
+def units_about(scene: bpy.types.Scene, obj: bpy.types.Object) -> SceneUnits:
+    """Frames and lengths of a scene, and the frame in which an object is read by itself."""
+    place, units = np.eye(4), settings.units_of(scene)
+    place[:3, 3] = world_matrix(obj)[:3, 3]
+    return replace(units, frame=still_frame(place, units, felt_gravity(settings.gravity_direction_of(scene), [obj])))
+
+
+def matrix_in(frame: GroundFrame, obj: bpy.types.Object) -> Array:
+    """Space of the ground, or of another object, to the frame of a bake, (4, 4) [Blender units]."""
+    if frame.moves:
+        return np.array(frame.riding.get(obj.name_full, frame.matrix))
+    return np.asarray(np.array(frame.matrix) @ world_matrix(obj))
+
+
+def in_scene(points: Array, scene: bpy.types.Scene, frame: GroundFrame | None) -> Array:
+    """Points (..., 3) of a bake [m] where they are in its scene [Blender units]."""
+    units: Array = points / scene.unit_settings.scale_length
+    if frame is None:
+        return units
+    matrix = np.array(to_world(frame, scene.softground.ground))
+    return np.asarray(units @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def from_scene(points: Array, scene: bpy.types.Scene, frame: GroundFrame | None) -> Array:
+    """Points (..., 3) in a scene [Blender units] as a bake has them [m]."""
+    if frame is not None:
+        matrix = np.linalg.inv(np.array(to_world(frame, scene.softground.ground)))
+        points = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return np.asarray(points * scene.unit_settings.scale_length)
+
+
+def to_world(frame: GroundFrame | None, ground: bpy.types.Object | None) -> Matrix:
+    """The frame of a bake to the world, as its ground lies now [Blender units]."""
+    if frame is None:
+        return Matrix()
+    inverse = Matrix(np.linalg.inv(np.array(frame.matrix)).tolist())
+    return ground.matrix_world @ inverse if frame.moves and ground else inverse
+
+
+def hang_on(obj: bpy.types.Object, ground: bpy.types.Object, frame: GroundFrame | None) -> None:
+    """Parent an object whose own place is in the frame of a bake to the ground of that."""
+    obj.parent = ground
+    if frame is None:
+        obj.matrix_parent_inverse = ground.matrix_world.inverted()
+    else:
+        obj.matrix_parent_inverse = Matrix(np.linalg.inv(matrix_in(frame, ground)).tolist())

@@ -1,0 +1,120 @@
+"""The frame that a bake is solved in, where it is not the world's: on ground that moves or is far from the origin, and
+where gravity points elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.motion.ground_frame import Array, GroundFrame, axes_of, rows, upright
+from ...core.motion.ground_ride import GroundRide
+from ...core.numerics.rigid import unit
+from ...core.rig.recording import SceneUnits
+from ...core.settings import BakeSettings
+from .. import jobs, settings
+from ..ground.still_ground import mover_of
+from ..placement import felt_gravity, still_frame, world_matrix
+from ..sampling.rig_recording import record_props
+from ..sampling.sampling_scene import object_named
+
+STIFF = 1e-4
+"""Ground keeps its shape where its axes change by less than this part of themselves."""
+STEEPEST = 60.0
+"""How far ground may tilt against what pulls on bodies there [degrees]: beyond, no height lies over each place."""
+MESH = 100.0
+"""Where there is no ground, its frame lies on a grid of this width, wherever in it the character is [m]."""
+
+
+def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
+    """The settings, with the frame that the scene is to be read and solved in.
+
+    Raises
+    ------
+    InputError
+        If the ground moves in a way that no frame follows.
+    """
+    ground, bodies = np.eye(4), list(_bodies(wanted))
+    direction = felt_gravity(wanted.gravity_direction, bodies)
+    if wanted.ground:
+        ground = world_matrix(settings.found(wanted.ground))
+        if mover_of(settings.found(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
+            return replace(wanted, frame=frame)
+    elif bodies:
+        place = world_matrix(bodies[0])[:3, 3] * wanted.unit_scale_m
+        ground[:3, 3] = np.round(place / MESH) * MESH / wanted.unit_scale_m
+    frame = still_frame(ground, wanted, direction)
+    if frame is None:
+        return wanted
+    in_metres = np.array(frame.matrix)
+    in_metres[:3, 3] *= wanted.unit_scale_m
+    return replace(wanted, frame=frame, camera=wanted.camera and wanted.camera.moved(in_metres))
+
+
+def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFrame | None:
+    """The frame of the settings' ground, which something moves; None where that keeps it still."""
+    assert wanted.ground
+    ground, scale = settings.found(wanted.ground), wanted.unit_scale_m
+    name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)
+    from_origin = np.eye(4)
+    from_origin[:3, 3] = world_matrix(ground)[:3, 3]
+    units = replace(settings.units_of(scene), frame=GroundFrame(rows(np.linalg.inv(from_origin))))
+    matrices = jobs.run(_path(scene, ground, frames, units))
+    matrices[:, :3] /= scale
+    matrices = from_origin @ matrices
+    if not np.ptp(matrices, axis=0).any():
+        return None
+    axes = axes_of(matrices)
+    shape = np.swapaxes(axes, -1, -2) @ matrices[:, :3, :3]
+    if np.ptp(shape, axis=0).max() > STIFF * np.abs(shape).max():
+        raise InputError(
+            f"Ground '{name}' changes its size in these frames: take the keys off its scale, and off those of its "
+            "parents, or choose a copy without them."
+        )
+    to_world = np.tile(np.eye(4), (len(frames), 1, 1))
+    to_world[:, :3, :3] = axes
+    to_world[:, :3, 3] = matrices[:, :3, 3] * scale
+    numbers = np.array(frames, dtype=np.float64)
+
+    def ride() -> GroundRide:
+        return GroundRide.of(numbers, to_world, wanted.frame_rate, up, wanted.gravity_m_s2)
+
+    own_up = ride().rest
+    level = upright(own_up.mean(axis=0))
+    leaning = np.degrees(np.arccos(np.clip(unit(own_up) @ level[2], -1.0, 1.0)).max())
+    if leaning > STEEPEST:
+        raise InputError(
+            f"Ground '{name}' tilts by up to {leaning:.0f}° against what pulls on it in these frames, and at most "
+            f"{STEEPEST:.0f}° can be baked at once: bake fewer frames, or choose a ground that turns less."
+        )
+    to_world[:, :3, :3] = to_world[:, :3, :3] @ level.T
+    in_units = to_world.copy()
+    in_units[:, :3, 3] /= scale
+    path = np.linalg.inv(in_units)
+    place = path[0] @ matrices[0]
+    frame = GroundFrame(rows(place), True, float(frames[0]), path, ride())
+    return replace(frame, riding=_riding(scene, ground, place))
+
+
+def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: SceneUnits) -> jobs.Job[Array]:
+    name = obj.name_full
+    reading = record_props(scene, obj.name, frames, units, [name])
+    recording = yield from jobs.counted(reading, "sample", len(frames))
+    return recording.props[name].copy()
+
+
+def _riding(scene: bpy.types.Scene, ground: bpy.types.Object, place: Array) -> dict[str, Array]:
+    """Space of each mesh that the same object moves, to the frame in which the ground's own is at some place (4, 4)."""
+    to_frame, mover = place @ np.linalg.inv(world_matrix(ground)), mover_of(ground)
+    riders = (obj for obj in scene.objects if obj.type == "MESH" and obj != ground and mover_of(obj) == mover)
+    return {obj.name_full: to_frame @ world_matrix(obj) for obj in riders}
+
+
+def _bodies(wanted: BakeSettings) -> Iterator[bpy.types.Object]:
+    for character in wanted.characters:
+        if owner := character.armature or character.body:
+            yield settings.found(owner)
+        yield from (object_named(sole.object) for sole in character.soles if sole.object)

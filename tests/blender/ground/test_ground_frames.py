@@ -1,0 +1,282 @@
+"""Ground far from the origin, and turned ground under turned gravity, are baked as level ground at the origin is."""
+
+from math import pi
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix, Vector
+
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender.debris import debris_object
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.live import live
+from softground_addon.blender.reading import analysis
+from softground_addon.core.errors import InputError
+from softground_addon.core.record.edits import StepEdit
+from tests.blender.grounds import as_rendered, bake, field
+
+MAP = (548000.0, 5932000.0, 0.0)
+WHERE = {
+    "on_a_map": Matrix.Translation(MAP),
+    "on_a_wall": Matrix.Rotation(pi / 2, 4, "X"),
+    "askew_on_a_map": Matrix.Translation(MAP) @ Euler((1.0, -2.0, 0.5)).to_matrix().to_4x4(),
+}
+
+
+def moved(scene, matrix):
+    """Move a scene as a whole, and turn its gravity with it."""
+    for obj in scene.objects:
+        if obj.parent is None:
+            obj.matrix_basis = matrix @ obj.matrix_basis
+    scene.gravity = matrix.to_3x3() @ scene.gravity
+    bpy.context.view_layer.update()
+
+
+def hung_up(scene, place_of_all=(0, 0, 0)):
+    """Hang a whole scene on an empty at some place."""
+    place = bpy.data.objects.new("Place", None)
+    for obj in scene.objects:
+        if obj.parent is None:
+            obj.parent = place
+    scene.collection.objects.link(place)
+    place.location = place_of_all
+    bpy.context.view_layer.update()
+
+
+def posed(scene):
+    """Heads of the bones in the armature's space over the walk, (F, B, 3)."""
+    rig, heads = scene.softground.characters[0].armature, []
+    for frame in range(1, 31, 4):
+        scene.frame_set(frame)
+        shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        heads.append([bone.head[:] for bone in shown.pose.bones])
+    return np.array(heads)
+
+
+@pytest.mark.parametrize("parented", [False, True])
+@pytest.mark.parametrize("where", WHERE)
+def test_a_bake_is_the_same_wherever_the_shot_is(short_walk, where, parented):
+    scene = short_walk
+    field(scene)
+    if parented:
+        hung_up(scene)
+    before = bake(scene).footprints
+    bpy.ops.softground.clear_bake()
+    moved(scene, WHERE[where])
+    now = bake(scene).footprints
+    assert len(now) == len(before) == 3
+    for here, there in zip(now, before, strict=True):
+        assert here.position == pytest.approx(there.position, abs=1e-5)
+        assert here.max_depth_m == pytest.approx(there.max_depth_m, abs=1e-5)
+    assert bake_report.stale_reasons(scene) == ()
+
+
+def test_feet_are_let_down_into_prints_on_a_wall_as_on_level_ground(short_walk):
+    field(short_walk)
+    bake(short_walk, sink_feet=True)
+    feet = posed(short_walk)
+    bpy.ops.softground.clear_bake()
+    assert np.abs(posed(short_walk) - feet).max() > 0.02
+    moved(short_walk, WHERE["on_a_wall"])
+    bake(short_walk)
+    assert posed(short_walk) == pytest.approx(feet, abs=2e-4)
+
+
+def test_feet_stay_as_they_are_where_blender_would_round_their_layer(short_walk):
+    field(short_walk)
+    moved(short_walk, WHERE["on_a_map"])
+    report = bake(short_walk, sink_feet=True).report
+    assert any("Feet were not lowered" in text and "0.5 units" in text for text in report["warnings"])
+
+
+def test_steps_events_and_what_is_thrown_are_told_where_they_are_in_the_world(short_walk):
+    ground = field(short_walk)
+    short_walk.softground.debris = True
+    before, wall = bake(short_walk), WHERE["on_a_wall"]
+    bpy.context.view_layer.update()
+    pieces = debris_object.of(ground)
+    middle = pieces.matrix_world @ Vector(pieces.data.vertices[0].co)
+    bpy.ops.softground.clear_bake()
+    moved(short_walk, wall)
+    now = bake(short_walk)
+    bpy.context.view_layer.update()
+    for table in ("steps", "events"):
+        for here, there in zip(now.report[table], before.report[table], strict=True):
+            assert here["position"] == pytest.approx(wall @ Vector(there["position"]), abs=2e-5)
+    assert baked_ground.events_of(ground)[0]["normal"] == pytest.approx(wall @ Vector((0, 0, 1)), abs=1e-4)
+    pieces = debris_object.of(ground)
+    assert (pieces.matrix_world @ Vector(pieces.data.vertices[0].co))[:] == pytest.approx((wall @ middle)[:], abs=1e-4)
+
+
+def test_a_ground_is_created_under_a_walk_on_a_wall_that_is_far_away(short_walk):
+    before = bake(short_walk)
+    deepest = before.report["totals"]["max_depth_m"]
+    ground = short_walk.softground.ground
+    bpy.data.objects.remove(ground)
+    moved(short_walk, Matrix.Translation(MAP) @ WHERE["on_a_wall"])
+    now = bake(short_walk)
+    assert now.report["totals"]["max_depth_m"] == pytest.approx(deepest, rel=1e-2)
+    assert short_walk.softground.ground.matrix_world.col[2][:3] == pytest.approx((0, -1, 0), abs=1e-6)
+
+
+def deck(scene, *, keyed=(), cell=0.02):
+    """A walk on a field that both hang from a ship, which is keyed at each frame by a function of the time [s]."""
+    field(scene)
+    scene.softground.cell_size = cell
+    hung_up(scene)
+    ship = bpy.data.objects["Place"]
+    if keyed:
+        for frame in range(-23, 61):
+            ship.location, ship.rotation_euler = keyed(frame / 24)
+            ship.keyframe_insert("location", frame=frame)
+            ship.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    return ship
+
+
+def still(_time):
+    return (0, 0, 0), (0, 0, 0)
+
+
+def sailing(time):
+    return (6 * time, 2 * time, 0), (0, 0, 0)
+
+
+def rising(time):
+    return (0, 0, time * time), (0, 0, 0)
+
+
+@pytest.mark.parametrize("keyed", [still, sailing])
+@pytest.mark.parametrize("away", [False, True])
+def test_prints_on_a_deck_that_is_still_or_sails_evenly_are_those_without_a_deck(short_walk, keyed, away):
+    deck(short_walk)
+    if away:
+        hung_up(short_walk, MAP)
+    before = bake(short_walk).footprints
+    bpy.ops.softground.clear_bake()
+    ship = bpy.data.objects["Place"]
+    for frame in range(-23, 61):
+        ship.location = keyed(frame / 24)[0]
+        ship.keyframe_insert("location", frame=frame)
+    short_walk.frame_set(1)
+    now = bake(short_walk).footprints
+    for here, there in zip(now, before, strict=True):
+        of_both = ((*step.position, step.max_depth_m, step.compressed_m3) for step in (here, there))
+        assert next(of_both) == (next(of_both) if keyed is still else pytest.approx(next(of_both), rel=1e-6, abs=1e-7))
+    assert bake_report.stale_reasons(short_walk) == ()
+    short_walk.frame_set(20)
+    assert bake_report.stale_reasons(short_walk) == ()
+
+
+def test_prints_sail_along_with_the_deck(short_walk):
+    deck(short_walk, keyed=sailing)
+    bake(short_walk)
+    shown = baked_ground.display_mesh_of(short_walk.softground.ground)
+    short_walk.frame_set(30)
+    low = as_rendered(shown)[:, 2].argmin()
+    short_walk.frame_set(54)
+    later = as_rendered(shown)[low]
+    short_walk.frame_set(30)
+    assert later - as_rendered(shown)[low] == pytest.approx((6, 2, 0), abs=1e-4)
+
+
+def test_a_lift_that_speeds_up_presses_prints_deeper(short_walk):
+    deck(short_walk)
+    before = bake(short_walk).report["events"]
+    bpy.ops.softground.clear_bake()
+    bpy.data.objects.remove(bpy.data.objects["Place"])
+    bpy.data.objects.remove(short_walk.softground.ground)
+    deck(short_walk, keyed=rising)
+    now = bake(short_walk).report["events"]
+    added = 2 / 9.81
+    for here, there in zip(now, before, strict=True):
+        if there["peak_bw"] > 1.0 and there["phase"] == "foot_flat":
+            assert here["peak_bw"] == pytest.approx(there["peak_bw"] + added, abs=0.02)
+
+
+def test_steps_on_a_crate_that_rides_along_stand_on_it(short_walk):
+    deck(short_walk, keyed=sailing)
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(0, -0.8, -0.01))
+    crate = bpy.context.object
+    crate.scale = (1, 0.5, 0.02)
+    crate.parent = bpy.data.objects["Place"]
+    bpy.context.view_layer.update()
+    short_walk.softground.hard_grounds.add().object = crate
+    steps = bake(short_walk).footprints
+    assert [step for step in steps if abs(step.position[1] + 0.8) < 0.1] == []
+    assert len(steps) == 2
+    crate.parent = None
+    with pytest.raises(InputError, match="'Cube' in Hard Ground stands still while 'Place' moves the ground"):
+        bake(short_walk)
+
+
+def turning_over(time):
+    return (0, 0, 0), (1.5 * time, 0, 0)
+
+
+def test_a_ground_that_turns_over_or_changes_its_size_is_refused(short_walk):
+    ship = deck(short_walk, keyed=turning_over)
+    short_walk.softground.frame_end = 60
+    with pytest.raises(InputError, match=r"Ground 'Field' tilts by up to \d+° against what pulls on it"):
+        bake(short_walk)
+    ship.animation_data_clear()
+    for frame, size in ((1, 1.0), (30, 1.2)):
+        ship.scale = (size,) * 3
+        ship.keyframe_insert("scale", frame=frame)
+    with pytest.raises(InputError, match="Ground 'Field' changes its size in these frames"):
+        bake(short_walk)
+
+
+def test_feet_sink_into_prints_on_a_sailing_deck_as_on_a_still_one(short_walk):
+    deck(short_walk)
+    bake(short_walk, sink_feet=True)
+    feet = posed(short_walk)
+    bpy.ops.softground.clear_bake()
+    for frame in range(-23, 61):
+        bpy.data.objects["Place"].location = sailing(frame / 24)[0]
+        bpy.data.objects["Place"].keyframe_insert("location", frame=frame)
+    short_walk.frame_set(7)
+    bake(short_walk)
+    assert posed(short_walk) == pytest.approx(feet, abs=1e-4)
+
+
+def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
+    deck(short_walk, keyed=sailing)
+    result = bake(short_walk)
+    short_walk.frame_set(20)
+    edited = jobs.run(step_edits.reading(short_walk))
+    name = edited.left.steps[1].name
+    jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
+    left = baked_ground.record_of(short_walk.softground.ground).edited
+    assert len(left) == len(result.footprints)
+    moves = [new.position - old.position for new, old in zip(left, result.footprints, strict=True)]
+    assert moves[1] == pytest.approx((0.1, 0, 0), abs=0.02)
+    assert moves[0] == pytest.approx((0, 0, 0))
+
+
+def test_what_a_shot_is_known_by_holds_while_the_deck_moves_on(short_walk):
+    deck(short_walk, keyed=sailing)
+    known = analysis.read(short_walk)
+    short_walk.frame_set(20)
+    assert analysis.known(short_walk) is known
+    bpy.data.objects["Place"].location.x = 9
+    bpy.data.objects["Place"].keyframe_insert("location", frame=20)
+    analysis.look_again()
+    assert analysis.known(short_walk) is None
+
+
+def test_live_mode_presses_a_deck_that_sails(short_walk):
+    deck(short_walk, keyed=sailing)
+    bake(short_walk)
+    short_walk.frame_set(30)
+    deepest = as_rendered(baked_ground.display_mesh_of(short_walk.softground.ground))[:, 2].min()
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    try:
+        short_walk.frame_set(30)
+        shown = baked_ground.display_mesh_of(short_walk.softground.ground)
+        assert as_rendered(shown)[:, 2].min() == pytest.approx(deepest, abs=2e-3)
+    finally:
+        live.discard()
