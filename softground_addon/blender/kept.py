@@ -19,8 +19,8 @@ from .state import state
 Result = TypeVar("Result")
 State = TypeVar("State")
 
-LARGEST = 2**27
-"""Most that is held for the next bake [bytes]: prints of a minute of walking take a quarter of it."""
+LARGEST = 2**26
+"""Most that is held of each kind for the next bake [bytes]: prints of a minute of walking take half of it."""
 
 
 def forget() -> None:
@@ -29,21 +29,23 @@ def forget() -> None:
 
 
 def kept(
-    told: State, name: str, source: object, work: Generator[State, None, Result]
+    told: State, kind: str, source: object, work: Generator[State, None, Result], *, of: str = ""
 ) -> Generator[State, None, Result]:
-    """The result of work that follows from a source, which `hash_inputs` can compare; of each name, the last is held.
+    """The result of work that follows from a source, which `hash_inputs` can compare; the last of each kind is held.
 
-    While the source is compared, the driver is told the same state.
+    Of a kind of which there are several, that is the last `of` each name. While the source is compared, the driver is
+    told the same state.
     """
     compared = yield from meanwhile(told, hash_inputs.slices(source))
-    if name in state.kept and state.kept[name][0] == compared:
-        result: Result = state.kept[name][1]
-        return result
-    state.kept.pop(name, None)  # room for what comes
+    if last := state.kept.get((kind, of)):
+        if last[0] == compared:
+            result: Result = last[1]
+            return result
+        del last, state.kept[kind, of]  # room for what comes
     result = yield from work
     size = _size(result)
-    if size + sum(each[2] for each in state.kept.values()) <= LARGEST:
-        state.kept[name] = compared, result, size
+    if size + sum(each[2] for key, each in state.kept.items() if key[0] == kind) <= LARGEST:
+        state.kept[kind, of] = compared, result, size
     return result
 
 

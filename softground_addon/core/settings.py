@@ -184,6 +184,8 @@ class BakeSettings(SceneUnits):
         Slots of the ground that are made of something else, or are hard.
     gravity_direction : (float, float, float)
         Unit vector in the world.
+    under : 'AUTO', 'ALWAYS' or 'NEVER'
+        Whether prints show what lies below the layer; by default where that is thin.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -223,6 +225,7 @@ class BakeSettings(SceneUnits):
     carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
     gravity_direction: tuple[float, float, float] = field(default=DOWN, metadata=UNSAID)
+    under: str = field(default="AUTO", metadata={**UNSAID, **_on(Acts.WRITING)})
 
     @property
     def spacing_m(self) -> float:

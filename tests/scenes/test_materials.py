@@ -310,6 +310,26 @@ def test_a_pressed_spot_renders_differently_from_an_untouched_one(spot, ensure_m
 
 
 @pytest.mark.slow
+def test_what_lies_below_is_seen_where_little_of_a_thin_layer_is_left(spot, ensure_material):
+    """On the right 6 to 15 mm are pressed: through a layer of 5 mm is earth, in one of 1 m or of no depth snow."""
+    ground, seen = spot
+    ground.data.materials.append(ensure_material("snow"))
+    as_without = seen()
+    layer = ground.data.attributes.new("softground_layer", "FLOAT", "POINT")
+    pictures = {}
+    for depth in (0.005, 1.0):
+        layer.data.foreach_set("value", np.full(len(ground.data.vertices), depth, np.float32))
+        ground.data.update()
+        pictures[depth] = seen()
+    left, right = (slice(None), slice(4, 16)), (slice(None), slice(-16, -4))
+    assert pictures[1.0] == pytest.approx(as_without, abs=0.02)
+    assert pictures[0.005][left] == pytest.approx(as_without[left], abs=0.02)
+    earth = pictures[0.005][right].mean(axis=(0, 1))
+    assert earth[2] < 0.5 * as_without[right].mean(axis=(0, 1))[2]
+    assert earth[0] > 1.2 * earth[2]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_tread_is_seen_where_a_sole_has_pressed_and_not_before(spot, ensure_material, surface):
     ground, seen = spot

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 import numpy as np
@@ -28,7 +29,7 @@ from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.settings import Acts, BakeSettings
 from .. import settings
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh, trampled_ground
+from ..ground import baked_ground, ground_mesh, trampled_ground, under_layer
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
 from ..plants import trampling_table
@@ -149,6 +150,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             and (made_with.dense_shape_keys or not display_key.is_dense(settings.found(place.display_mesh))),
             marks=marks,
             water=water_at(relief, len(x)),
+            layer=partial(under_layer.layers, made_with=made_with),
         )
         is_draft, error, show = place.is_draft, spans.error, place.publish
         del (

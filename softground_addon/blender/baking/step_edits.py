@@ -130,8 +130,9 @@ def _sole_hashes(
 def _made_with(now: BakeSettings, left: record.BakeRecord) -> BakeSettings:
     """The settings of now, with those that the prints were pressed and put on the ground with."""
     try:
-        inputs = left.about["inputs"]
-        on_ground = {name: type(value)(inputs[name]) for name, value in now.between(Acts.WRITING, Acts.WRITING).items()}
+        inputs = {"under": "AUTO", **left.about["inputs"]}
+        writing = {"under": "AUTO", **now.between(Acts.WRITING, Acts.WRITING)}
+        on_ground = {name: type(value)(inputs[name]) for name, value in writing.items()}
         surfaces.find(inputs["surface"])
         if inputs["pressure"] not in get_args(Pressure):
             raise ValueError("there is no such pressure")

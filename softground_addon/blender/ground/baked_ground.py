@@ -149,6 +149,7 @@ def write(
     shape_keys: bool = True,
     marks: Array | None = None,
     water: Array | None = None,
+    layer: Callable[[bpy.types.Object], Array | None] = lambda _: None,
 ) -> Job[None]:
     """Put a bake on its place: the finished ground, the record, and the playback. It still has to be published.
 
@@ -174,6 +175,8 @@ def write(
         Where under a sole they lay, as in `own_data.SOLE`.
     water : (K,) float array, optional
         How deep the water on them is [m].
+    layer : callable, optional
+        Gives the depth of the layer at all vertices of the display mesh, where what lies below it shows (V,) [m].
     """
     found(table)  # or nothing is written
     ground_checks.check_playable(found(place.display_mesh))
@@ -187,6 +190,9 @@ def write(
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
         ground_mesh.write_shading(display_mesh, own_data.WATER, place.index, water)
+        layers = layer(display_mesh)
+        of_places = None if layers is None else layers[place.index]
+        ground_mesh.write_shading(display_mesh, own_data.LAYER, place.index, of_places)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ Textures are laid out in world space, so that grains keep their size on any grou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ from ...core.ground.surfaces import SurfaceRecord
 from ..compat import shader_tree
 from ..drafts import none_left_if_it_fails
 from ..ground_slots import MARK, OVER
-from ..playback.own_data import COMPRESSION, RIM, SOLE
+from ..playback.own_data import COMPRESSION, LAYER, RIM, SOLE
 from ..playback.weather_nodes import FRESH
 from ..shader_graph import Graph, Socket
 from . import surface_shaders
@@ -34,6 +34,13 @@ EDGE = "ground_edge"
 WIDE = 5.0
 """Size of the largest shades and swells of open ground [m]; five octaves are in them."""
 
+
+UNCOVERED = (0.5, 0.8)
+"""Compression from which on what lies below a layer shows here and there, and everywhere, over the layer's depth."""
+RAGGED, CRUMBS = 0.5, 0.03
+"""How far that varies from place to place, and the size of the largest of these [m]: snow is torn off in crumbs."""
+THINNEST = 1e-6
+"""Layer from which on there is one [m]."""
 
 SOLID_LUMINANCE = 0.15
 """Least luminance of a ground in Solid shading: on darker ground no print is seen there."""
@@ -121,7 +128,7 @@ def _look(graph: Graph, surface: SurfaceRecord, ground: Ground, *, is_open: bool
     build: Callable[[Graph, Ground], Look] = getattr(surface_shaders, surface.shader)
     if not is_open:
         look = build(graph, ground)
-        return under_weather(graph, surface, look.inputs, look.relief)
+        return under_weather(graph, surface, _with_under(graph, surface, look.inputs), look.relief)
     wide = graph.noise(ground.place, WIDE, 5.0, 0.65)
     # Swells are decimetres high. EEVEE makes bump of a displacement with an error that grows with its height and
     # the curvature of the mesh (stripes on the walls of prints); a bump node has none.
@@ -130,7 +137,23 @@ def _look(graph: Graph, surface: SurfaceRecord, ground: Ground, *, is_open: bool
     shade = graph.ramp(wide, 0.30, 0.70, *surface.shades)
     colour = graph.node("ShaderNodeVectorMath", {0: look.inputs["Base Color"], "Scale": shade}, operation="SCALE")
     inputs = {"Normal": normal, "Coat Normal": normal, **look.inputs, "Base Color": graph.out(colour)}
-    return under_weather(graph, surface, inputs, look.relief)
+    return under_weather(graph, surface, _with_under(graph, surface, inputs), look.relief)
+
+
+def _with_under(graph: Graph, surface: SurfaceRecord, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Shader inputs of a surface, and of what lies below it where little of the layer is left; in crumbs between."""
+    layer = graph.attribute(LAYER)
+    is_thin = graph.math("GREATER_THAN", layer, THINNEST)
+    crumbs = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), CRUMBS, 4.0, 0.7)
+    pressed = graph.math("DIVIDE", graph.attribute(COMPRESSION), layer + THINNEST) * bare(graph) * is_thin
+    share = graph.ramp(pressed + (crumbs + -0.5) * RAGGED, *UNCOVERED) * is_thin
+    shade = graph.ramp(crumbs, 0.3, 0.7, 0.6, 1.4)
+    below = graph.out(graph.node("ShaderNodeVectorMath", {0: surface.under, "Scale": shade}, operation="SCALE"))
+    shown = {**inputs, "Base Color": graph.mix(share, inputs["Base Color"], below)}
+    for name, value in (("Roughness", 0.85), ("Subsurface Weight", 0.0), ("Coat Weight", 0.0)):
+        if name in inputs:
+            shown[name] = graph.blend(share, inputs[name], value)
+    return shown
 
 
 def ground_of(graph: Graph) -> Ground:

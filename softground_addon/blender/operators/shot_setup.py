@@ -125,11 +125,11 @@ class SOFTGROUND_OT_use_as_ground(Reading):
         if not super().poll(context):
             return False
         cls.poll_message_set(translated("Select the mesh to walk on, not a character"))
-        return _selected_ground(context) is not None or _selected_instance(context) is not None
+        return selected_ground(context) is not None or _selected_instance(context) is not None
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         _check_no_instance(bpy.context)
-        chosen = _selected_ground(bpy.context)
+        chosen = selected_ground(bpy.context)
         assert chosen is not None
         return _taken_as_ground(scene, chosen)
 
@@ -166,7 +166,7 @@ class SOFTGROUND_OT_create_ground(Reading):
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         if self.use_selected:
             _check_no_instance(bpy.context)
-            if chosen := _selected_ground(bpy.context):
+            if chosen := selected_ground(bpy.context):
                 return (yield from _taken_as_ground(scene, chosen))
         wanted = shots.settings_of(scene)
         plan = yield from shots.fit_ground(scene, wanted)
@@ -196,7 +196,7 @@ def _check_no_instance(context: bpy.types.Context) -> None:
         )
 
 
-def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
+def selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active object if it is a selected mesh that no character wears or carries and that does not print itself.
 
     Of a copy that takes the prints of a ground, that ground.

@@ -176,6 +176,7 @@ class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
         column = layout.column()
         column.prop(options.material, "surface")
         column.operator("softground.apply_look", icon="MATERIAL")
+        column.prop(options, "under")
         column.prop(options, "cell_size_cm")
         column.prop(options, "longest_bake")
         column.prop(options.material, "blur_sigma_cm")

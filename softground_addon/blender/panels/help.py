@@ -45,6 +45,7 @@ PAGES = (
     ("bpy.types.softgroundpainted.*", "ground.html#masks"),
     ("bpy.ops.softground.*hard_ground", "ground.html#hard-ground"),
     ("bpy.types.softgroundhardground.*", "ground.html#hard-ground"),
+    ("bpy.ops.softground.cover", "ground.html#snow-on-things"),
     ("bpy.ops.softground.*character", "panel.html#character"),
     ("bpy.types.softgroundcharacter.*", "panel.html#character"),
     ("bpy.types.softgroundsole.*", "panel.html#character"),

@@ -18,7 +18,7 @@ from ..ground import baked_ground, ground_mesh, still_ground, trail_detail
 from ..live import live
 from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, draw_list
+from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, chosen_of, draw_list
 from ..settings import is_prop, is_set_up
 from ..translation import translated
 from . import outdated, preset_menu
@@ -43,6 +43,22 @@ class SOFTGROUND_UL_soles(Listed):
         icon = "MESH_CUBE" if item.object else "BONE_DATA" if item.kind == "LIMB" else "MOD_DYNAMICPAINT"
         layout.prop(item, "name", text="", emboss=False, icon=icon)
         layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
+
+
+class SOFTGROUND_UL_joints(Listed):
+    """Joints of a body, each with its bone; those that have none stand out."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        split = layout.split(factor=0.45)
+        split.label(text=_joint_label(item.name), icon="BONE_DATA" if item.bone else "ERROR", translate=False)
+        split.label(text=item.bone, translate=False)
+
+    def filter_items(self, _context: Any, data: Any, name: Any) -> Any:
+        """Sort them from the hips outward."""
+        place = {joint: number for number, joint in enumerate(JOINTS)}
+        joints = [place.get(joint.name, len(place)) for joint in getattr(data, name)]
+        order = sorted(range(len(joints)), key=joints.__getitem__)
+        return [], [order.index(number) for number in range(len(joints))]
 
 
 class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
@@ -184,23 +200,12 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
         character = active_character(settings.options_of(context))
         layout.prop(character, "armature")
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
-        column = layout.column(align=True)
-        order = {joint: place for place, joint in enumerate(JOINTS)}
-        for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
-            split = column.split(factor=0.3, align=True)
-            name = split.row()
-            name.alignment = "RIGHT"
-            name.label(text=_joint_label(joint.name), translate=False)
-            row = split.row(align=True)
-            row.use_property_split = False
-            row.prop_search(joint, "bone", character.armature.data, "bones", text="")
-            end = row.row(align=True)
-            end.ui_units_x = _END_WIDTH
-            end.prop(joint, "end", text="")
-
-
-_END_WIDTH = 4.8
-"""Width of a bone's end, in units of the interface: the bone has the rest."""
+        layout.template_list(
+            "SOFTGROUND_UL_joints", "", character, "joints", character, "active_joint", rows=5, maxrows=len(JOINTS)
+        )
+        if joint := chosen_of(character, "joints", "active_joint"):
+            layout.prop_search(joint, "bone", character.armature.data, "bones")
+            layout.prop(joint, "end")
 
 
 def _joint_label(joint: str) -> str:
@@ -357,6 +362,7 @@ def _changing_ground(layout: Any, options: Any) -> None:
 CLASSES = (
     SOFTGROUND_UL_characters,
     SOFTGROUND_UL_soles,
+    SOFTGROUND_UL_joints,
     SOFTGROUND_PT_character,
     SOFTGROUND_PT_ground,
     SOFTGROUND_PT_bake,

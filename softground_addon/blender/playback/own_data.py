@@ -12,9 +12,11 @@ from .weather_nodes import OF_WEATHER, WATER
 
 SOLE = "softground_sole"
 """Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
+LAYER = "softground_layer"
+"""Depth of the layer that feet press through to what lies below [m]; 0 where nothing says so."""
 PASSES = "softground_passes"
 """How many soles have trodden on a vertex, of grounds with plants that give way."""
-ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, PASSES, *OF_PLAYBACK, *OF_WEATHER)
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, LAYER, PASSES, *OF_PLAYBACK, *OF_WEATHER)
 
 RECORD = "softground_record"
 SUMMARY = "softground_summary"

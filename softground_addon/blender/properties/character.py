@@ -178,6 +178,7 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         "How much of the baked response shows: 0 is the original animation, 1 the response as baked. Needs no new bake",
     )
     joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
+    active_joint: IntProperty(name="Active Joint", options={"HIDDEN"})
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)
     active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})
     holds: CollectionProperty(name="Foot Locks", type=SoftGroundHold)

@@ -142,6 +142,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_max=20.0,
         precision=1,
     )
+    under: EnumProperty(
+        name="Under-Layer",
+        description="When prints show what lies below the layer: earth under snow, wet sand under dry",
+        items=[
+            ("AUTO", "Where Thin", "Where the layer is up to 8 cm deep"),
+            ("ALWAYS", "Always", "Wherever feet press through most of the layer, however deep it is"),
+            ("NEVER", "Never", "Prints look like the layer all the way down"),
+        ],
+        default="AUTO",
+    )
     detail: EnumProperty(
         name="Detail",
         translation_context=CONTEXT,

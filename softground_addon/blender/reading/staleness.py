@@ -201,8 +201,16 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         | ({"body": True} if "body" in character else {})
         for character in inputs["characters"]
     ]
-    whole: dict[str, Any] = {"marks": True, "carve": True, "hard_grounds": (), "wet_grounds": (), "regions": ()}
-    whole |= {"gravity_direction": DOWN, **inputs}
+    unsaid = {
+        "marks": True,
+        "carve": True,
+        "hard_grounds": (),
+        "wet_grounds": (),
+        "regions": (),
+        "gravity_direction": DOWN,
+        "under": "AUTO",
+    }
+    whole: dict[str, Any] = unsaid | {"gravity_direction": DOWN} | dict(inputs)
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 

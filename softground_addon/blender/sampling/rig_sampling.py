@@ -137,7 +137,7 @@ def recorded_motion(
         if source.object
     }
     read = name, bones, mapping, recording, skin, mass, skin_mass, carried
-    return (yield from kept(len(recording.frames), f"motion of {name}", read, _motion(*read)))
+    return (yield from kept(len(recording.frames), "motion", read, _motion(*read), of=name))
 
 
 def _motion(

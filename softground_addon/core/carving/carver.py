@@ -97,7 +97,7 @@ class CarvedCells:
     loose : (rows, columns) float array
         Height of the loose matter [m].
     cut_height, packed, unplaced : float
-        Sums of the heights that were cut of what stood, packed, and found no place around [m].
+        Sums of the heights that were cut of what stood or fell, packed, and found no place around [m].
     """
 
     cell_size: float
@@ -218,6 +218,7 @@ class CarvedCells:
         ) - (before - self.terrain)
         loose = self.loose + change
         fallen = loose < -ROUNDING
+        self.cut_height -= float(loose[fallen].sum())
         self.lowest[fallen] = (standing + loose)[fallen]
         self.loose = np.maximum(loose, 0.0)
 

@@ -187,6 +187,8 @@ class SurfaceRecord:
         Of the loose matter [kg/m³]; sand is quartz of 2,650 with 40 % of pores.
     colour : (float, float, float)
         Of its pieces, and of the ground in Solid shading.
+    under : (float, float, float)
+        Colour of what lies below it: earth, wet sand, grey sand without air, gravel, clay.
     shades, swell : (float, float), float
         Brightness of the darkest and the lightest parts of open ground, and the height of its swells [m].
     shader, relief : str
@@ -219,6 +221,7 @@ class SurfaceRecord:
     fragments: Fragments
     voice: Voice
     colour: Triple
+    under: Triple
     shades: Range
     swell: float
     shader: str
@@ -251,7 +254,7 @@ SURFACES = {record.name: record for record in (
             translucency=0.5,
         ),
         voice=Voice(1.0, 0.25, 0.3, 0.0, (1000, 4000), (0.0015, 0.004), 220.0, 1.5, (1500, 6000), (80, 150)),
-        colour=(0.87, 0.90, 0.94), shades=(0.92, 1.0), swell=0.50,
+        colour=(0.87, 0.90, 0.94), under=(0.12, 0.07, 0.04), shades=(0.92, 1.0), swell=0.50,
         shader="snow", relief="snow", midi_note=36,
         wall_packing=0.73, wall_cohesion=180.0,
         drifts_from=0.27, melts=True, control="hand_hardness",
@@ -263,7 +266,7 @@ SURFACES = {record.name: record for record in (
         thrown=ThrownMatter(34.0, 0.1e-3, 0, (0.3e-3, 2.0e-3), (2.0, 6.0), 16_000, 0.01),
         fragments=Fragments(0.002, 0.15, 2, translucency=0.15),
         voice=Voice(0.0, 1.0, 0.25, 0.0, (2000, 6000), (0.0005, 0.001), 0.0, 1.5, (1200, 7000), (60, 110)),
-        colour=(0.66, 0.48, 0.29), shades=(0.84, 1.10), swell=0.20,
+        colour=(0.66, 0.48, 0.29), under=(0.24, 0.16, 0.09), shades=(0.84, 1.10), swell=0.20,
         shader="dry_sand", relief="sand", midi_note=40,
         wall_packing=0.05, wall_cohesion=0.0,
         soaking=Soaking(127e-3 / HOUR, 10e-3 / HOUR, 4.0 / HOUR, 2.0), drifts_from=0.23, control="moisture",
@@ -274,7 +277,7 @@ SURFACES = {record.name: record for record in (
         thrown=ThrownMatter(45.0, 0.4e-3, 8, (2.0e-3, 12.0e-3), (5.0, 9.0)),
         fragments=Fragments(0.012, 0.2, 2),
         voice=Voice(0.25, 0.7, 0.5, 0.15, (800, 3000), (0.001, 0.003), 200.0, 1.6, (600, 3500), (70, 120)),
-        colour=(0.24, 0.16, 0.09), shades=(0.74, 1.18), swell=0.14,
+        colour=(0.24, 0.16, 0.09), under=(0.09, 0.085, 0.08), shades=(0.74, 1.18), swell=0.14,
         shader="wet_sand", relief="wet_sand", midi_note=44,
         wall_packing=0.05, wall_cohesion=1000.0,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
@@ -289,7 +292,7 @@ SURFACES = {record.name: record for record in (
             ((1, 0.9, 0.35), (1, 0.7, 0.45), (1, 0.85, 0.25), (1, 0.8, 0.6), (1, 0.45, 0.3), (1, 0.25, 0.2)),
         ),
         voice=Voice(0.3, 0.6, 0.5, 0.8, (250, 900), (0.004, 0.012), 60.0, 1.8, (150, 1200), (60, 100)),
-        colour=(0.10, 0.065, 0.04), shades=(0.70, 1.25), swell=0.16,
+        colour=(0.10, 0.065, 0.04), under=(0.22, 0.20, 0.18), shades=(0.70, 1.25), swell=0.16,
         shader="mud", relief="mud", midi_note=48,
         wall_packing=0.0, wall_cohesion=2000.0,
         soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",
@@ -301,7 +304,7 @@ SURFACES = {record.name: record for record in (
         thrown=ThrownMatter(38.0, 0.3e-3, 0, (2.0e-3, 30.0e-3), (3.0, 12.0)),
         fragments=Fragments(0.030, 0.2, 6, angular=True),
         voice=Voice(0.9, 0.35, 0.45, 0.0, (500, 3000), (0.002, 0.007), 500.0, 1.3, (400, 2500), (70, 140)),
-        colour=(0.12, 0.07, 0.04), shades=(0.70, 1.25), swell=0.16,
+        colour=(0.12, 0.07, 0.04), under=(0.28, 0.16, 0.07), shades=(0.70, 1.25), swell=0.16,
         shader="soil", relief="soil", midi_note=52,
         wall_packing=0.15, wall_cohesion=1000.0,
         soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0), control="soil_moisture",

@@ -1,6 +1,7 @@
 """One ground of several materials, each of which names a preset: snow, sand, mud, and a hard floor."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -8,11 +9,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_slots, jobs, setting_paths, settings
+from softground_addon.blender import ground_slots, jobs, preset_files, setting_paths, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
-from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.ground import baked_ground, under_layer
 from softground_addon.blender.materials.materials import MARK, OVER
 from softground_addon.blender.output import sound_exports
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
@@ -322,6 +323,47 @@ def test_crumbs_look_like_the_material_that_they_come_from(four):
     bake(four)
     assert debris_nodes.LOOK not in debris_object.of(four.softground.ground).data.attributes
     assert sum(bool(block.get(debris_nodes.MARK)) for block in bpy.data.collections) == 1
+
+
+def depths_of_layers(ground):
+    """Depth of the layer at the vertices that a bake moves, and where these are, (K,) and (K, 3)."""
+    mesh = baked_ground.display_mesh_of(ground).data
+    if "softground_layer" not in mesh.attributes:
+        return None
+    values, places = np.empty(len(mesh.vertices), np.float32), np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.attributes["softground_layer"].data.foreach_get("value", values)
+    mesh.vertices.foreach_get("co", places)
+    return values[values > 0], places.reshape(-1, 3)[values > 0]
+
+
+def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, monkeypatch):
+    ground = four.softground.ground
+    bake(four)
+    assert depths_of_layers(ground) is None
+    assert "under" not in baked_ground.record_of(ground).about["inputs"]
+    four.softground.under = "ALWAYS"
+    assert bake_report.stale_reasons(four) == ("The settings have changed",)
+    bake(four)
+    assert set(depths_of_layers(ground)[0]) == {np.float32(four.softground.material.layer_depth)}
+    editable = step_edits.editable(four)
+    assert editable.made_with.under == "ALWAYS"
+    step_edits.edit(four, editable, {editable.left.steps[0].name: StepEdit(mute=True)})
+    assert depths_of_layers(ground) is not None
+    four.softground.under = "AUTO"
+    thin = replace(presets.find("mud"), material=replace(presets.find("mud").material, layer_depth=0.04))
+    (tmp_path / "thin_mud.json").write_text(presets.dump(thin))
+    monkeypatch.setattr(preset_files, "user_folder", lambda: tmp_path)
+    choose(("", "thin_mud", "", ground_slots.HARD))
+    bake(four)
+    depth, place = depths_of_layers(ground)
+    is_thin = (place[:, 1] < BORDERS[0] - 0.1) & (place[:, 1] > BORDERS[1] + 0.1)
+    assert depth[is_thin] == pytest.approx(0.04)
+    assert (depth[place[:, 1] > BORDERS[0] + 0.1] == under_layer.DEEP).all()
+    four.softground.under = "NEVER"
+    bake(four)
+    assert depths_of_layers(ground) is None
+    bpy.ops.softground.clear_bake()
+    assert not [one.name for one in ground.data.attributes if one.name.startswith("softground")]
 
 
 def test_soles_carry_what_sticks_onto_a_hard_material(four):

@@ -29,6 +29,7 @@ from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
 from softground_addon.core.ground import presets
 from softground_addon.core.loads.cell_limits import Coverage, Fineness
+from softground_addon.core.motion.motion import JOINTS
 from tests.blender.shots import import_motion, walker
 from tests.tiers import slow_but_one
 
@@ -124,6 +125,32 @@ def test_the_first_screen_is_a_score_of_controls(shot):
     first = (panels.SOFTGROUND_PT_character, panels.SOFTGROUND_PT_ground, panels.SOFTGROUND_PT_bake)
     controls = [call for panel in first for call in drawn(panel)[0] if call[0] in CONTROLS]
     assert 12 < len(controls) <= 20
+
+
+def test_with_everything_open_a_walking_figure_has_little_more_than_a_hundred_controls(shot):
+    def controls():
+        every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+        sidebar = [cls for cls in every if cls.bl_region_type == "UI"]
+        shown = [cls for cls in sidebar if not hasattr(cls, "poll") or cls.poll(bpy.context)]
+        return sum(call[0] in CONTROLS for cls in shown for call in drawn(cls)[0])
+
+    assert controls() <= 105
+    bpy.ops.softground.bake()
+    assert controls() <= 120
+
+
+def test_a_joint_of_the_body_is_chosen_in_a_list_and_given_its_bone(shot):
+    character = shot.softground.characters[0]
+    for number in range(len(character.joints)):
+        character.active_joint = number
+        calls, _ = drawn(panels.SOFTGROUND_PT_joints)
+        asked = [call[1][:2] for call in calls if call[0] in ("prop", "prop_search")]
+        assert asked[-2:] == [(character.joints[character.active_joint], field) for field in ("bone", "end")]
+    _, places = panels.SOFTGROUND_UL_joints.filter_items(None, bpy.context, character, "joints")
+    names = [joint.name for _, joint in sorted(zip(places, character.joints, strict=True), key=lambda pair: pair[0])]
+    assert names == [joint for joint in JOINTS if joint in names]
+    character.active_joint = len(character.joints)
+    assert [call[0] for call in drawn(panels.SOFTGROUND_PT_joints)[0]] == ["prop", "operator", "template_list"]
 
 
 def test_what_makes_a_bake_outdated_takes_no_room_and_raises_no_alarm(shot):

@@ -29,6 +29,7 @@ NO_INPUT = {
     "active_character": "which one the list shows",
     "active_hard_ground": "which one the list shows",
     "characters.active_hold": "which one the list shows",
+    "characters.active_joint": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.root_motion_strength": "how much of a layer shows, which counts as the rig's movement",
     "characters.clean_feet_strength": "how much of a layer shows, which counts as the rig's movement",

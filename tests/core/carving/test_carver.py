@@ -145,6 +145,7 @@ def test_a_wall_falls_that_is_higher_than_its_cohesion_holds():
     cells.slide(walls, np.zeros_like(cells.closed), (0, 0), 4 * SWEEPS_TO_REST)
     highest = max(np.abs(cells.surface[one] - cells.surface[other]).max() for one, other, _ in NEIGHBOURS)
     assert highest < walls.strength + 0.02
+    assert cells.loose.sum() == pytest.approx(cells.cut_height - cells.packed, rel=1e-9), "what fell was cut"
     assert cells.surface.sum() == pytest.approx(-cells.packed, rel=1e-9)
 
 

@@ -1,0 +1,52 @@
+"""Where prints show what lies below the layer that they are in: how deep that is at each vertex."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.ground.variation import CHANNELS
+from ...core.settings import BakeSettings
+from .. import ground_slots
+from . import ground_mesh, painted_ground
+
+Array = NDArray[np.float64]
+
+THIN = 0.08
+"""Depth of a layer up to which what lies below shows by default [m]: a shoe goes through some centimetres of snow, and
+through a deep layer only where it packs less than any does."""
+
+DEEP = 1e3
+"""Depth that no print goes through [m]."""
+
+
+def layers(display_mesh: bpy.types.Object, made_with: BakeSettings) -> Array | None:
+    """Depth of the layer at the vertices of a display mesh (V,) [m], `DEEP` where what lies below it does not show.
+
+    Where faces of several materials meet, the least of them. None if it shows nowhere.
+    """
+    of_slots = {region.slot: region.material.layer_depth if region.material else DEEP for region in made_with.regions}
+    own, mesh = made_with.material.layer_depth, ground_mesh.mesh_of(display_mesh)
+    name = made_with.painted[CHANNELS.index("depth")]
+    is_painted = painted_ground.is_there(display_mesh, name)
+    least = min([own, *of_slots.values()])
+    if made_with.under == "NEVER" or (made_with.under == "AUTO" and least > THIN and not is_painted):
+        return None
+    depth = np.full(len(mesh.vertices), own)
+    if of_slots:
+        slots = ground_slots.of_faces(mesh)
+        of_faces = np.full(max([*of_slots, int(slots.max(initial=0))]) + 1, own)
+        of_faces[list(of_slots)] = list(of_slots.values())
+        starts, corners = np.empty(len(slots), np.int32), np.empty(len(mesh.loops), np.int32)
+        mesh.polygons.foreach_get("loop_start", starts)
+        mesh.loops.foreach_get("vertex_index", corners)
+        count = np.diff(np.append(starts, len(corners)))
+        depth[:] = np.inf
+        np.minimum.at(depth, corners, np.repeat(of_faces[slots], count))
+        depth[np.isinf(depth)] = own
+    if is_painted and (factors := painted_ground.factors(display_mesh, mesh, (name,))) is not None:
+        depth *= factors[:, 0]
+    if made_with.under == "AUTO":
+        depth[depth > THIN] = DEEP
+    return depth if (depth < DEEP).any() else None

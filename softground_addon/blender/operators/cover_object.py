@@ -1,0 +1,86 @@
+"""*Cover*: snow, sand or leaves on things, as a ground that prints like any other."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty
+
+from ...core.errors import InputError
+from ...core.meshing.cover import Cover, cover
+from .. import mesh_arrays, settings
+from ..drafts import none_left_if_it_fails
+from ..ground import created_ground, ground_checks, ground_surface
+from ..operator_base import reports_errors
+from ..properties import SoftGroundPainted
+from ..reading import analysis
+from ..translation import translated
+from .shot_setup import selected_ground
+
+SPACING = 0.04
+"""Largest distance of a cover's vertices [m]; the trail is refined as on any coarse ground."""
+
+
+class SOFTGROUND_OT_cover(bpy.types.Operator):
+    """Lay a ground of this thickness on the selected mesh: on its faces that look up, with rounded edges"""
+
+    bl_idname = "softground.cover"
+    bl_label = "Cover"
+    bl_options = {"REGISTER", "UNDO"}
+
+    thickness_cm: FloatProperty(
+        name="Thickness (cm)",
+        description="Of the layer; no print is deeper",
+        default=10.0,
+        min=1.0,
+        max=500.0,
+        soft_max=60.0,
+        precision=1,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether a mesh is selected that may be covered."""
+        cls.poll_message_set(translated("Select the mesh to cover, in Object Mode"))
+        return context.mode == "OBJECT" and selected_ground(context) is not None
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, obj = settings.scene_of(context), selected_ground(context)
+        assert obj is not None
+        if fault := ground_checks.hard_fault(obj):
+            raise InputError(fault.replace(" in Hard Ground", ""))
+        unit, thickness = settings.units_of(scene).unit_scale_m, settings.typed(self.thickness_cm) / 100.0
+        surface = ground_surface.undisturbed_surface(obj, unit)
+        try:
+            laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
+        except InputError as error:
+            raise InputError(f"'{obj.name}' cannot be covered. {error}") from None
+        options = scene.softground
+        with analysis.own_changes(scene):
+            ground = _object_of(laid, f"{obj.name} Cover", unit, thickness)
+            created_ground.publish(scene, ground, options.material.surface)
+        options.material.layer_depth, options.under = thickness, "NEVER"  # there is no earth below
+        created_ground.select(scene, ground)
+        self.report({"INFO"}, translated("'{name}' is now the ground", name=ground.name))
+        return {"FINISHED"}
+
+
+@none_left_if_it_fails()
+def _object_of(laid: Cover, name: str, unit: float, thickness: float) -> bpy.types.Object:
+    """A cover as an object that is in no scene yet; its layer is painted as deep as it is."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(laid.vertices))
+    mesh.vertices.foreach_set("co", (laid.vertices / unit).astype(np.float32).ravel())
+    mesh.loops.add(laid.faces.size)
+    mesh.loops.foreach_set("vertex_index", laid.faces.astype(np.int32).ravel())
+    mesh.polygons.add(len(laid.faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, laid.faces.size, laid.faces.shape[1], dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(laid.faces), bool))
+    mesh.update(calc_edges=True)
+    depth = SoftGroundPainted.bl_rna.properties["layer_depth"].default
+    mesh_arrays.add_attributes(mesh, [(depth, "FLOAT", laid.thickness / thickness)])
+    return bpy.data.objects.new(name, mesh)
+
+
+CLASSES = (SOFTGROUND_OT_cover,)
