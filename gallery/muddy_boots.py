@@ -47,7 +47,7 @@ class MuddyBoots:
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> MuddyBoots:
     """A floor of stone beside a muddy yard, and a walk over both."""
     ground = open_air.add_ground(scene, "Yard", (-3.0, START + 2.0), height, "mud")
-    scene.softground.hard_grounds.add().object = _floor(scene)
+    scene.softground.hard_grounds.add().object = slab(scene, "Floor", (END, EDGE), TOP, stone())
     bpy.context.view_layer.update()
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (1.05, 1.75, 0.95), (-0.02, -0.9, 0.0), 32.0, (0.0, -0.5, 0.0), 11.0)
@@ -88,20 +88,27 @@ def shoot(built: MuddyBoots, folder: Path, samples: int) -> list[Path]:
     return [whole, close]
 
 
-def _floor(scene: bpy.types.Scene) -> bpy.types.Object:
-    """A slab of stone tiles."""
-    x, y, z = (-HALF_WIDTH, HALF_WIDTH), (END, EDGE), (TOP - BELOW, TOP)
+def slab(
+    scene: bpy.types.Scene,
+    name: str,
+    y: tuple[float, float],
+    top: float,
+    material: bpy.types.Material,
+    half_width: float = HALF_WIDTH,
+) -> bpy.types.Object:
+    """A slab across the way, from one y to another and up to a height [m]."""
+    x, z = (-half_width, half_width), (TOP - BELOW, top)
     corners = [(a, b, c) for c in z for a, b in ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))]
     faces = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
-    mesh = bpy.data.meshes.new("Floor")
+    mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], faces)
-    mesh.materials.append(_stone())
-    floor = bpy.data.objects.new("Floor", mesh)
+    mesh.materials.append(material)
+    floor = bpy.data.objects.new(name, mesh)
     scene.collection.objects.link(floor)
     return floor
 
 
-def _stone() -> bpy.types.Material:
+def stone() -> bpy.types.Material:
     """Tiles of pale stone with dark joints."""
     material = stage.plain_material("Stone Tiles", (0.42, 0.40, 0.36), 0.6)
     tree = material.node_tree

@@ -62,6 +62,13 @@ def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
     return [obj for obj in listed if exists(obj) and obj != options.ground]
 
 
+def _wet_grounds(options: Any) -> tuple[str, ...]:
+    """With what each of the hard objects is wet; none if all are dry."""
+    liquids = {item.object: item.wet.lower() for item in reversed(options.hard_grounds) if item.wet != "NONE"}
+    wet = tuple(liquids.get(obj, "") for obj in hard_grounds_of(options))
+    return wet if any(wet) else ()
+
+
 def forget_deleted_ground(options: Any) -> None:
     """Take a ground that was deleted out of the settings."""
     if options.ground is not None and not exists(options.ground):
@@ -184,6 +191,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
+        wet_grounds=_wet_grounds(options),
         marks=options.marks,
         under=options.under,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),

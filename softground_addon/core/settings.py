@@ -174,6 +174,8 @@ class BakeSettings(SceneUnits):
         The scene's, where a ground is to be made; None without one.
     hard_grounds : tuple of ObjectName
         Objects that soles stand on without a print.
+    wet_grounds : tuple of str
+        What wets each of the `hard_grounds`, empty of a dry one; none if all are dry.
     marks : bool
         Whether soles leave on hard ground what sticks to them.
     carve : bool
@@ -218,6 +220,7 @@ class BakeSettings(SceneUnits):
     weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
+    wet_grounds: tuple[str, ...] = field(default=(), metadata={**UNSAID, **_on(Acts.RESPONDING)})
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)

@@ -142,7 +142,7 @@ def bake(
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
         findings += of_ground
-        marks_object.put(published.ground, marks, surface=marks.surface if marks else wanted.surface, units=wanted)
+        marks_object.put(published.ground, marks, surface=marks.floors.kind if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene.softground, wanted, layers)
     finished = time.perf_counter()

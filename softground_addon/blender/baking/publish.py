@@ -15,7 +15,6 @@ from ...core.carried.marks import Marks, marks_of
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
 from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
-from ...core.ground import surfaces
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.loads.estimate import CharacterLoads
@@ -85,29 +84,21 @@ def marks_left(
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
 ) -> Slices[Marks | None]:
-    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`. Of several grounds that stick, those
-    of the one that leaves most.
-    """
+    """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
         return None
-    shed = shed_volumes(debris) if debris is not None else {}
     shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
-    dirty = {character.name: character.dirty_soles for character in made_with.characters}
-    most: Marks | None = None
-    for surface in dict.fromkeys([made_with.surface, *(step.surface for step in left.footprints if step.surface)]):
-        density = surfaces.find(surface).density
-        marks = yield from marks_of.slices(
+    return (
+        yield from marks_of.slices(
             loads,
             left.steps,
             terrain,
-            surface=surface,
-            shed={step: volume * density for step, volume in shed.items()},
+            surface=made_with.surface,
+            shed=shed_volumes(debris) if debris is not None else {},
             treads=dict.fromkeys(shod, made_with.tread_m),
-            brought=dirty if surface == made_with.surface else {},
+            brought={character.name: character.dirty_soles for character in made_with.characters},
         )
-        if most is None or (marks and marks.carried.left_behind > most.carried.left_behind):
-            most = marks
-    return most
+    )
 
 
 def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:

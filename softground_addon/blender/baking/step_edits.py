@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.edited_steps import EditedSteps
+from ...core.debris.debris import shed_volumes
 from ...core.errors import InputError
 from ...core.ground import surfaces
 from ...core.ground.material import Pressure
@@ -22,6 +23,7 @@ from ...core.record.footprints import extent
 from ...core.settings import Acts, BakeSettings, RegionSettings
 from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
+from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
 from ..reading import staleness
@@ -100,8 +102,10 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
     is_deleted = bool(left.thrown) and debris_object.of(ground) is None
     throwing = with_debris.slices(left, ground_of(bake.made_with, bake.shot), bake.made_with)
     left, debris = yield from jobs.meanwhile(jobs.Progress("simulate", 1.0), throwing)
+    shed = shed_volumes(debris) if debris is not None else {}
     debris = None if is_deleted else debris
     published, _ = yield from bake_job.write_prints(scene, bake.made_with, bake.shot, left, debris, sole_length)
+    marks_object.follow(published.ground, left.steps, shed)
     sign(
         published,
         bake.made_with,

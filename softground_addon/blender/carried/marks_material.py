@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ...core.ground.surfaces import SurfaceRecord
+from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ..compat import shader_tree
 from ..shader_graph import Graph, Socket
 from . import marks_nodes as nodes
@@ -21,13 +21,15 @@ SMEAR = 0.4
 """How much of the floor a smear between lumps covers."""
 DRY_SHADE = 2.6
 """How much paler mud is when it is dry."""
+PAINT_SHADE = 0.55
+"""How much darker paint and blood are when they are dry."""
 CLODS = 3e-3
 """Height of clods where a mark is thickest [m]."""
 WET_SHADE = 0.55
 """Light that a wet floor gives back, over that of a dry one."""
 
 
-def material_for(surface: SurfaceRecord) -> bpy.types.Material:
+def material_for(surface: SurfaceRecord | Liquid) -> bpy.types.Material:
     """A new material of marks of a surface."""
     material = bpy.data.materials.new(f"SoftGround {surface.label} Marks")
     material[nodes.MARK], material.diffuse_color = surface.name, (*surface.colour, 1.0)
@@ -38,6 +40,8 @@ def material_for(surface: SurfaceRecord) -> bpy.types.Material:
     wet = graph.attribute(nodes.WETNESS)
     if surface.melts:
         shader, height = _snow(graph, amount, edge, wet)
+    elif surface.name == "water":
+        shader, height = _damp(graph, _thin(graph, amount, edge, wet)), wet * 0.0
     else:
         shader, height = _earth(graph, surface, amount, edge, wet)
     relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
@@ -45,7 +49,7 @@ def material_for(surface: SurfaceRecord) -> bpy.types.Material:
     return material
 
 
-def _amount(graph: Graph, surface: SurfaceRecord) -> tuple[Socket, Socket]:
+def _amount(graph: Graph, surface: SurfaceRecord | Liquid) -> tuple[Socket, Socket]:
     """How much lies at a place, over what covers a floor, and 1 under the sole, 0 beside it."""
     assert surface.carried is not None
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
@@ -65,17 +69,21 @@ def _amount(graph: Graph, surface: SurfaceRecord) -> tuple[Socket, Socket]:
     return amount, graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
 
 
-def _earth(graph: Graph, surface: SurfaceRecord, amount: Socket, edge: Socket, wet: Socket) -> tuple[Socket, Socket]:
+def _earth(
+    graph: Graph, surface: SurfaceRecord | Liquid, amount: Socket, edge: Socket, wet: Socket
+) -> tuple[Socket, Socket]:
     """Mud or sand: wet it is dark and shines, dry it is pale and has flaked off where it was thin."""
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
     flaked = graph.blend(wet, 0.12, 0.0)
     solid = graph.ramp(graph.math("SUBTRACT", amount, flaked), 0.18, 0.45) * edge
     smeared = graph.ramp(graph.math("SUBTRACT", amount, flaked), -0.25, 0.4) * edge * SMEAR
     alpha = graph.math("MAXIMUM", solid, smeared)
-    pale: Any = tuple(min(1.0, part * DRY_SHADE) for part in surface.colour)
+    shade = PAINT_SHADE if surface.name == "paint" else DRY_SHADE
+    pale: Any = tuple(min(1.0, part * shade) for part in surface.colour)
     uneven = graph.swing(place, 0.012, 3.0) * 0.5
     colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), pale, surface.colour)
-    height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * CLODS)
+    clods = CLODS if isinstance(surface, SurfaceRecord) else 0.02 * CLODS
+    height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * clods)
     inputs = {
         "Base Color": colour,
         "Roughness": graph.blend(wet, 0.92, 0.34) + uneven * 0.3,
@@ -92,11 +100,21 @@ def _snow(graph: Graph, amount: Socket, edge: Socket, wet: Socket) -> tuple[Sock
     inputs = {"Base Color": (0.87, 0.90, 0.94, 1.0), "Roughness": 0.7, "Alpha": alpha}
     lying = graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs))
     thin = graph.ramp(amount, 0.05, 0.2) * edge * graph.ramp(melted, 0.0, 0.5) * graph.ramp(wet, 0.0, 0.4)
+    whole = graph.node("ShaderNodeMixShader", {0: alpha, 1: _damp(graph, thin), 2: lying})
+    return graph.out(whole), alpha * (graph.noise(place, 0.008, 4.0, 0.6) * (0.4 * CLODS))
+
+
+def _thin(graph: Graph, amount: Socket, edge: Socket, wet: Socket) -> Socket:
+    """How much of a film of water covers a place: it dries from its thin places on."""
+    dried = graph.blend(wet, 1.6, 0.0)
+    return graph.ramp(graph.math("SUBTRACT", amount, dried), 0.0, 0.12) * edge * graph.ramp(wet, 0.0, 0.25)
+
+
+def _damp(graph: Graph, thin: Socket) -> Socket:
+    """The floor, where a film of water covers it as much as that."""
     is_shadow = graph.out(graph.node("ShaderNodeLightPath"), 1)  # the floor below is lit
     thin = thin * graph.math("SUBTRACT", 1.0, is_shadow)
-    shown = graph.node("ShaderNodeMixShader", {0: thin, 1: _clear(graph, 1.0), 2: _water(graph)})
-    whole = graph.node("ShaderNodeMixShader", {0: alpha, 1: graph.out(shown), 2: lying})
-    return graph.out(whole), alpha * (graph.noise(place, 0.008, 4.0, 0.6) * (0.4 * CLODS))
+    return graph.out(graph.node("ShaderNodeMixShader", {0: thin, 1: _clear(graph, 1.0), 2: _water(graph)}))
 
 
 def _water(graph: Graph) -> Socket:

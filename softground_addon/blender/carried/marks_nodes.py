@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.ground.surfaces import SurfaceRecord
+from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.weather import weather
 from ..node_graph import NodeGraph, Number
 from ..node_modifiers import new_group
@@ -23,6 +23,10 @@ BIRTH, MASS, KIND, WETNESS, SOLE, STEP = "birth", "mass", "kind", "wetness", "so
 place along and across the sole and distance to its outline [m], number of the contact."""
 TREAD = "tread"
 """Depth of the grooves of the sole [m], 0 of bare feet."""
+SHARE, ZONE = "share", "zone"
+"""Share of the film on the sole that is left there, and zone of the sole: for steps that are edited."""
+NOTHING = -1.0
+"""Mass of a mark that no sole leaves as the steps are now."""
 MELTED = "melted"
 """Share of snow that has melted, 0 to 1."""
 
@@ -35,21 +39,32 @@ INPUTS = (
         "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
     ),
     ("Temperature", 10.0, -60.0, 60.0, "Temperature of the floor in °C: above 0, snow on it melts"),
+    (
+        "Rain",
+        0.0,
+        0.0,
+        200.0,
+        "Rain in millimetres per hour: it keeps marks wet and washes them off, 90 % by 13 mm",
+    ),
     ("Time Scale", 1.0, 0.0, 1e7, "How many times faster than the animation marks dry and melt"),
 )
 """Name, value, least, most and description of each of the group's inputs; only snow has a temperature."""
+WASH_OFF = 0.18
+"""Share that a millimetre of rain washes off paved ground, of what is there [1/mm]: 90 % by half an inch (J. D. Sartor
+and G. B. Boyd, EPA-R2-72-081, 1972, as in the Storm Water Management Model)."""
 MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
 """In metres per second."""
 
 
-def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
+def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     """A new node group for marks of a surface, in a scene whose time counts so many frames per second."""
     assert surface.carried is not None
     graph = NodeGraph(new_group(GROUP, MARK))
     geometry, sliders = _inputs(graph, surface)
     frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
     age = (graph.number(frame) - graph.number(graph.attribute(BIRTH))) / frame_rate
-    geometry = graph.without(geometry, graph.compare("LESS_THAN", age.socket, 0.0))
+    is_none = graph.compare("LESS_THAN", graph.attribute(MASS), 0.0)
+    geometry = graph.without(geometry, graph.either(graph.compare("LESS_THAN", age.socket, 0.0), is_none))
     passed = age * sliders["Time Scale"]
     water = graph.number(graph.attribute(MASS)) * (surface.carried.water / weather.WATER_DENSITY)
     if surface.melts:
@@ -57,13 +72,16 @@ def build(surface: SurfaceRecord, *, frame_rate: float) -> Any:
         melted = (passed * rate / water).within_one()
         geometry = graph.store(geometry, MELTED, melted.socket, True)
         passed = np.maximum(passed - water / rate, 0.0) * rate.above(0.0)
-    lost = passed * sliders["Drying"] * MILLIMETRES_PER_HOUR
+    lost = passed * (sliders["Drying"] - sliders["Rain"]).at_least(0.0) * MILLIMETRES_PER_HOUR
     wet = weather.wetness(lost / water * weather.SURFACE_FILM)
-    graph.finish(graph.store(geometry, WETNESS, wet.socket, True))
+    geometry = graph.store(geometry, WETNESS, wet.socket, True)
+    fallen = age * sliders["Time Scale"] * sliders["Rain"] * (MILLIMETRES_PER_HOUR * 1e3)
+    remains = graph.number(graph.attribute(MASS)) * (fallen * -WASH_OFF).exp()
+    graph.finish(graph.store(geometry, MASS, remains.socket, True))
     return graph.tree
 
 
-def _inputs(graph: NodeGraph, surface: SurfaceRecord) -> tuple[Any, dict[str, Number]]:
+def _inputs(graph: NodeGraph, surface: SurfaceRecord | Liquid) -> tuple[Any, dict[str, Number]]:
     interface = graph.tree.interface
     for way in ("INPUT", "OUTPUT"):
         interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Vector
+from numpy.typing import NDArray
 
-from ...core.carried.marks import Marks
+from ...core.carried.film import Meeting
+from ...core.carried.marks import FloorSteps, Marks, SoleOnFloors
 from ...core.ground import surfaces
 from ...core.meshing.face_edges import face_edges
+from ...core.record.record import EditableStep
 from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
@@ -25,6 +31,8 @@ BELONGS = Belonging(nodes.MARK, "softground_marked", "softground_marked_by")
 of = BELONGS.of
 ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 """Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
+FLOORS, THICKNESS = "softground_floors", "softground_thickness"
+"""Of its mesh: steps on hard floors, and how much thicker it is for its mass [Blender units m²/kg]."""
 
 
 def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: SceneUnits) -> bpy.types.Object | None:
@@ -39,7 +47,7 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
         mesh = _mesh(marks, surface, units)
         group = _group_for(modifier and modifier.node_group, surface, units)
         if not older or _is_ours_of_another(older, surface):
-            mesh.materials.append(material_for(surfaces.find(surface)))
+            mesh.materials.append(material_for(surfaces.sticking(surface)))
     obj = older or bpy.data.objects.new(NAME, mesh)
     if older:
         if len(mesh.materials):
@@ -52,6 +60,61 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     _play(modifier or obj.modifiers.new(NAME, "NODES"), group)
     _remove_unused()
     return obj
+
+
+def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> None:
+    """Have the marks of a ground, if there are any, weigh what steps on the soft ground come to, as they are edited.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    steps, shed
+        As of `FloorSteps.films`.
+    """
+    obj = of(ground)
+    mesh: Any = obj and obj.data
+    if mesh is None or mesh.get(FLOORS) is None:
+        return
+    share, zone, step, before = (_values(mesh, name) for name in (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS))
+    films, _ = _floors(mesh[FLOORS]).films(steps, shed)
+    each = np.array([films[number] for number in range(len(films))])
+    mass = _or_nothing(each[step.astype(int), zone.astype(int)] * share, step.astype(int))
+    place = mesh_arrays.positions(mesh)
+    place[:, 2] += (np.maximum(mass, 0.0) - np.maximum(before, 0.0)) * mesh[THICKNESS]
+    mesh.vertices.foreach_set("co", place.astype(np.float32).ravel())
+    mesh.attributes[nodes.MASS].data.foreach_set("value", mass.astype(np.float32))
+    mesh.update()
+
+
+def _values(mesh: Any, name: str) -> NDArray[np.float64]:
+    attribute = mesh.attributes[name].data
+    values = np.empty(len(attribute), np.float32 if mesh.attributes[name].data_type == "FLOAT" else np.int32)
+    attribute.foreach_get("value", values)
+    return values.astype(float)
+
+
+def _or_nothing(mass: NDArray[np.float64], step: NDArray[Any]) -> NDArray[np.float64]:
+    """Mass of vertices, `NOTHING` of those of marks that weigh nothing."""
+    return np.where(np.bincount(step, mass)[step] > 0, mass, nodes.NOTHING) if len(step) else mass
+
+
+def _text(floors: FloorSteps) -> str:
+    """Steps on hard floors as text."""
+    return json.dumps(asdict(floors), default=np.ndarray.tolist)
+
+
+def _floors(text: str) -> FloorSteps:
+    """Steps on hard floors from `_text`."""
+    said = json.loads(text)
+    soles = []
+    for sole in said["soles"]:
+        meetings = tuple(
+            Meeting(one["frame"], None if one["shares"] is None else np.array(one["shares"]))
+            for one in sole["meetings"]
+        )
+        fixed = {"of": tuple(sole["of"]), "areas": np.array(sole["areas"]), "meetings": meetings}
+        soles.append(SoleOnFloors(**{**sole, **fixed}))
+    return FloorSteps(said["kind"], said["ground"], tuple(soles))
 
 
 def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
@@ -90,7 +153,7 @@ def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
     frame_rate = units.frame_rate * units.time_stretch
     made_for = f"{surface} {frame_rate}"
     if not group or group.get(MADE_FOR) != made_for:
-        group = nodes.build(surfaces.find(surface), frame_rate=frame_rate)
+        group = nodes.build(surfaces.sticking(surface), frame_rate=frame_rate)
         group[MADE_FOR] = made_for
     return group
 
@@ -111,13 +174,18 @@ def _play(modifier: Any, group: Any) -> None:
 
 def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     """The mesh of marks, as seen from its first vertex."""
-    record = surfaces.find(surface)
+    record = surfaces.sticking(surface)
     assert record.carried is not None
     unit_scale = units.unit_scale_m
-    thick = marks.position + (0.0, 0.0, 1.0) * (marks.mass / record.density)[:, None]
-    place, origin = thick / unit_scale, marks.position[0] / unit_scale
+    place = marks.position / unit_scale
+    place[:, 2] += marks.mass / record.density / unit_scale
+    origin = marks.position[0] / unit_scale
     mesh = bpy.data.meshes.new(NAME)
-    mesh[ORIGIN] = origin.tolist()
+    mesh[ORIGIN], mesh[FLOORS], mesh[THICKNESS] = (
+        origin.tolist(),
+        _text(marks.floors),
+        1.0 / record.density / unit_scale,
+    )
     mesh.vertices.add(len(place))
     mesh.vertices.foreach_set("co", (place - origin).astype(np.float32).ravel())
     corners, starts = marks.faces.ravel(), 4 * np.arange(len(marks.faces))
@@ -126,7 +194,9 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
     columns = (
         (nodes.BIRTH, "FLOAT", marks.birth * units.time_stretch),
-        (nodes.MASS, "FLOAT", marks.mass),
+        (nodes.MASS, "FLOAT", _or_nothing(marks.mass, marks.step)),
+        (nodes.SHARE, "FLOAT", marks.share),
+        (nodes.ZONE, "INT8", marks.zone),
         (nodes.TREAD, "FLOAT", marks.tread),
         (nodes.KIND, "INT8", np.full(len(place), surfaces.CARRIED_KINDS.index(record.carried.kind))),
         (nodes.STEP, "INT", marks.step),

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.ground.variation import CHANNELS
+from ...core.numerics.arrays import Array
 from ...core.settings import BakeSettings
 from .. import ground_slots
 from . import ground_mesh, painted_ground
-
-Array = NDArray[np.float64]
 
 THIN = 0.08
 """Depth of a layer up to which what lies below shows by default [m]: a shoe goes through some centimetres of snow, and

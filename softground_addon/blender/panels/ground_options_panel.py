@@ -157,7 +157,10 @@ class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         options = settings.options_of(context)
-        draw_list(self.fields(), options, "hard_grounds", "active_hard_ground", "hard_ground", most=5)
+        layout = self.fields()
+        draw_list(layout, options, "hard_grounds", "active_hard_ground", "hard_ground", most=5)
+        if 0 <= options.active_hard_ground < len(options.hard_grounds):
+            layout.prop(options.hard_grounds[options.active_hard_ground], "wet")
 
 
 class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):

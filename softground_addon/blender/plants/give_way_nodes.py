@@ -1,20 +1,21 @@
 """The node group by which plants and litter give way: a scatter and the time in, the scatter at that time out.
 
 It is native Blender data and needs nothing of this add-on. What it looks up are the vertices of an object, the table of
-`trampling_table`: tiles of small cells, and for each cell the passes of soles over it. A root finds its cell by
-arithmetic, without a search; what no sole has come near is only compared. The law is `core.plants.bending`.
+`trampling_table`: tiles of small cells, and for each cell the passes of soles over it. The law, `core.plants.bending`,
+is worked out for each pass that acts at the time; a root finds its cell by arithmetic, without a search, and takes what
+is there. What no sole has come near is only compared.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
 import bpy
 
-from ...core.plants.bending import Pass, Plant, bend
+from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..node_graph import NodeGraph, Number
 from ..node_modifiers import new_group
 
@@ -22,17 +23,28 @@ GROUP = "SoftGround Give Way"
 MARK = "softground_give_way"
 """Custom property of the group."""
 
-TILES, FIRST, ACTIVE = "softground_tiles", "softground_first", "softground_active"
-TIMES, LEAN, PACE, SINK = "softground_times", "softground_lean", "softground_pace", "softground_sink"
-"""Of each pass: times and reach; direction [rad], what lasts, height above; speeds and number; height and slope."""
+TILES, FIRST = "softground_tiles", "softground_first"
+"""Of each tile: its first slot, less what the cell at its corner counts for; of each slot, its first pass."""
+ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
+    f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
+)
+"""Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
+direction; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
+_HELD, _OLDER, _SUNK = (f".softground_{name}" for name in ("held", "older", "sunk"))
+"""Of passes meanwhile, vectors: bend, bend of what is worn down, and share of what is not; the same of what is left of
+the earlier one; slope and height now."""
 META = "softground_meta"
 """Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first frame."""
 
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
-_ROOT, _TOUCHED, _CHANCE, _MOVED = (f".softground_{name}" for name in ("root", "touched", "chance", "moved"))
-"""Of curves, instances and points meanwhile. The last is a vector in the table's space: where it leans [rad], and how
-far its root goes up."""
+_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW = (
+    f".softground_{name}"
+    for name in ("root", "pass", "touched", "chance", "moved", "lean_way", "shift", "base", "part", "low")
+)
+"""Of curves, instances and points meanwhile. `_MOVED` is a vector in the table's space: where it leans [rad], and how
+far its root goes up; `_LEAN` the way of what is upright, for its length."""
+_MEANWHILE = (_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW)
 
 INPUTS: Mapping[str, tuple[str, Any, tuple[float, float] | None, str]] = {
     "Table": ("NodeSocketObject", None, None, "Where and when soles tread: an object that each bake writes"),
@@ -95,26 +107,27 @@ class _Table:
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
     frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+    plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
     table = _table(graph, chosen["Table"])
     graph.next_row()
-    slot, begun = _found(graph, table, frame)
-    plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
+    table = replace(table, vertices=_bent_passes(graph, table, plant, frame))
     graph.next_row()
-    touched = begun.above(0.5).socket, _moved(graph, table, slot, begun, plant, frame, chosen)
+    latest, moved = _latest(graph, table, frame), _moved(graph, table, chosen)
 
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
     position = graph.node("GeometryNodeInputPosition").outputs["Position"]
     root = _at(graph, position, first, "POINT")
-    geometry = _stored(graph, given, "CURVE", root, touched)
-    geometry = _put(graph, table, geometry, position)
+    geometry = _stored(graph, given, "CURVE", root, latest, moved)
+    geometry = _put(graph, table, geometry, "CURVE", position)
     graph.next_row()
-    geometry = _instances_moved(graph, table, _stored(graph, geometry, "INSTANCE", position, touched), chosen)
+    geometry = _stored(graph, geometry, "INSTANCE", position, latest, moved)
+    geometry = _instances_moved(graph, table, geometry, chosen)
     graph.next_row()
-    loose = _loose_parts_moved(graph, table, geometry, position, touched)
+    loose = _loose_parts_moved(graph, table, geometry, position, latest, moved)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
-    geometry = graph.forgotten(geometry, _ROOT, _TOUCHED, _CHANCE, _MOVED)
+    geometry = graph.forgotten(geometry, *_MEANWHILE)
     acts = graph.both(
         graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
@@ -159,75 +172,92 @@ def _in_cells(graph: NodeGraph, table: _Table) -> Any:
     return node.outputs["Vector"]
 
 
-def _found(graph: NodeGraph, table: _Table, frame: Number) -> tuple[Any, Number]:
-    """The slot of a root, and how many of its passes have begun."""
-    x, y, _ = graph.parts(graph.vector("FLOOR", _in_cells(graph, table)))
-    column, row = x.at_least(0.0).at_most(table.columns), y.at_least(0.0).at_most(table.rows)
-    across, down = (column / table.tile).floor(), (row / table.tile).floor()
-    tile = graph.at_index(table.vertices, graph.attribute(TILES, "INT"), (down * table.row + across).socket, "INT")
-    slot = graph.number(tile) + (row - down * table.tile) * table.tile + (column - across * table.tile)
+def _bent_passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> Any:
+    """The vertices of the table with what those passes come to that are the latest of their cells, or before these."""
+    active, *later = (graph.number(part) for part in graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR")))
+    start, end, passes = graph.parts(graph.attribute(TIMES, "FLOAT_VECTOR"))
+    down, up, above = graph.parts(graph.attribute(PACE, "FLOAT_VECTOR"))
+    reach, lasting, is_second = graph.parts(graph.attribute(SHARES, "FLOAT_VECTOR"))
+    by = Pass(start, end, down, up, reach, lasting, passes, above)
+    (standing, weight), (worn, _) = (bend(by, plant, frame, table.frame_rate, chance) for chance in (NO_ONE, EVERYONE))
+    remain = cover(passes, plant.half_after)
+    acts, ends = graph.compare("LESS_EQUAL", active.socket, frame.socket), []
+    for until in later:
+        ends.append(graph.both(acts, graph.compare("LESS_THAN", frame.socket, until.socket)))
+    held = graph.combined(standing.socket, worn.socket, remain.socket)
+    vertices = graph.store(table.vertices, _HELD, held, ends[1], "FLOAT_VECTOR")
 
-    active = graph.compare("LESS_EQUAL", graph.attribute(ACTIVE), frame.socket)
-    before = graph.accumulated(active, "INT").outputs["Leading"]
+    before = graph.math("SUBTRACT", graph.node("GeometryNodeInputIndex").outputs["Index"], 1.0)
+    yields = (is_second * (1.0 - weight)).socket
+    older = _at(graph, graph.attribute(_HELD, "FLOAT_VECTOR"), before, "POINT")
+    older = graph.vector("MULTIPLY", older, graph.combined(yields, yields, 1.0))
+    vertices = graph.store(vertices, _OLDER, older, ends[0], "FLOAT_VECTOR")
+
+    pressed = ((frame - start) / (end - start).at_least(1.0)).within_one()
+    sink = graph.attribute(SINK, "FLOAT_VECTOR")
+    was = graph.scaled(_at(graph, sink, before, "POINT"), is_second.socket)
+    sunk = graph.vector("ADD", was, graph.scaled(graph.vector("SUBTRACT", sink, was), pressed.socket))
+    return graph.store(vertices, _SUNK, sunk, ends[0], "FLOAT_VECTOR")
+
+
+def _latest(graph: NodeGraph, table: _Table, frame: Number) -> Any:
+    """The latest of the passes of a root that have begun, from 1 on; 0 without any."""
+    last = graph.combined(table.columns.socket, table.rows.socket, 0.0)
+    cell = graph.vector("MINIMUM", graph.vector("FLOOR", _in_cells(graph, table)), last)
+    cell = graph.vector("MAXIMUM", cell, (0.0, 0.0, 0.0))
+    tile = graph.vector("FLOOR", graph.scaled(cell, graph.math("DIVIDE", 1.0, table.tile.socket)))
+    number = graph.dot(tile, graph.combined(1.0, table.row.socket))
+    begin = graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number, "INT")
+    slot = graph.math("ADD", begin, graph.dot(cell, graph.combined(1.0, table.tile.socket)))
+
+    active = graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR"))[0]
+    before = graph.accumulated(graph.compare("LESS_EQUAL", active, frame.socket), "INT").outputs["Leading"]
     index = graph.node("GeometryNodeInputIndex").outputs["Index"]
     first = graph.attribute(FIRST, "INT")
     end = _at(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
     begun = graph.number(_at(graph, before, end, "POINT", "INT")) - graph.number(
         _at(graph, before, first, "POINT", "INT")
     )
-    return slot.socket, graph.number(graph.at_index(table.vertices, begun.socket, slot.socket, "INT"))
+    latest = (graph.number(first) + begun) * begun.above(0.5)
+    return graph.at_index(table.vertices, latest.socket, slot, "INT")
 
 
-def _pass(graph: NodeGraph, table: _Table, index: Any) -> tuple[Pass, list[Number], list[Number]]:
-    """A pass of the table, the direction in which it leans blades, and height and slope that it leaves."""
-    times, lean, pace, sink = (
-        graph.parts(graph.at_index(table.vertices, graph.attribute(name, "FLOAT_VECTOR"), index))
-        for name in (TIMES, LEAN, PACE, SINK)
-    )
-    by = Pass(times[0], times[1], pace[0], pace[1], times[2], lean[1], pace[2], lean[2])
-    return by, [graph.number(graph.math(name, lean[0].socket)) for name in ("COSINE", "SINE")], sink
-
-
-def _moved(graph: NodeGraph, table: _Table, slot: Any, begun: Number, plant: Plant, frame: Number, chosen: Any) -> Any:
+def _moved(graph: NodeGraph, table: _Table, chosen: Any) -> Any:
     """How a touched root moves, as `_MOVED` has it."""
-    first = graph.number(graph.at_index(table.vertices, graph.attribute(FIRST, "INT"), slot, "INT"))
-    latest = first + begun - 1.0
-    chance = graph.number(graph.attribute(_CHANCE))
-    by, way, remaining = _pass(graph, table, latest.socket)
-    older, older_way, older_left = _pass(graph, table, (latest - 1.0).socket)
-    is_second = begun.above(1.5)
-    angle, weight = bend(by, plant, frame, table.frame_rate, chance)
-    before, _ = bend(older, plant, frame, table.frame_rate, chance)
-    before = before * is_second * (1.0 - weight)
-    lean = [(new * angle + old * before) * (pi / 2) for new, old in zip(way, older_way, strict=True)]
+    latest = graph.number(graph.attribute(_PASS, "INT")) - 1.0
 
-    pressed = ((frame - by.start) / (by.end - by.start).at_least(1.0)).within_one()
-    height, *slope = (
-        old * is_second + (new - old * is_second) * pressed for new, old in zip(remaining, older_left, strict=True)
-    )
-    x, y, _ = graph.parts(graph.vector("FRACTION", _in_cells(graph, table)))
-    height = height + slope[0] * (x - 0.5) + slope[1] * (y - 0.5)
-    steep = graph.vector("LENGTH", graph.combined(slope[0].socket, slope[1].socket, 0.0), output="Value")
+    def of_pass(name: str, index: Number = latest) -> Any:
+        return graph.at_index(table.vertices, graph.attribute(name, "FLOAT_VECTOR"), index.socket)
+
+    chance, ways = graph.number(graph.attribute(_CHANCE)), []
+    for bends, index in ((_HELD, latest), (_OLDER, latest - 1.0)):
+        standing, worn, remain = graph.parts(of_pass(bends))
+        angle = standing + (worn - standing) * chance.above(remain)
+        ways.append(graph.scaled(of_pass(LEAN, index), (angle * (pi / 2)).socket))
+    slope = of_pass(_SUNK)
+    steep = graph.vector("LENGTH", graph.vector("MULTIPLY", slope, (1.0, 1.0, 0.0)), output="Value")
     level = (0.0 - graph.number(graph.math("ARCTANGENT", steep))) / graph.number(steep)
-    sunk = graph.choose("FLOAT", chosen["Sinks"], 0.0, height.socket)
-    tilt = [
-        graph.choose("FLOAT", chosen["Stands"], (part * level).socket, bent.socket)
-        for part, bent in zip(slope, lean, strict=True)
-    ]
-    return graph.combined(*tilt, sunk)
+    tilt = graph.choose("VECTOR", chosen["Stands"], graph.scaled(slope, level.socket), graph.vector("ADD", *ways))
+    beside = graph.vector("SUBTRACT", graph.vector("FRACTION", _in_cells(graph, table)), (0.5, 0.5, 0.0))
+    x, y, _ = graph.parts(beside)
+    height = graph.dot(slope, graph.combined(x.socket, y.socket, 1.0))
+    tilt = graph.parts(tilt)
+    return graph.combined(tilt[0].socket, tilt[1].socket, graph.choose("FLOAT", chosen["Sinks"], 0.0, height))
 
 
-def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, touched: tuple[Any, Any], each: Any = None) -> Any:
+def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, latest: Any, moved: Any, each: Any = None) -> Any:
     """The geometry with its roots and how the touched ones move, as attributes of a domain; `each` numbers plants."""
     geometry = graph.store(geometry, _ROOT, root, True, "FLOAT_VECTOR", domain)
-    geometry = graph.store(geometry, _TOUCHED, touched[0], True, "BOOLEAN", domain)
+    geometry = graph.store(geometry, _PASS, latest, True, "INT", domain)
+    is_touched = graph.compare("GREATER_THAN", graph.attribute(_PASS, "INT"), 0.5)
+    geometry = graph.store(geometry, _TOUCHED, is_touched, True, "BOOLEAN", domain)
     is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = next(socket for socket in random.outputs if socket.enabled)
     geometry = graph.store(geometry, _CHANCE, chance, is_touched, domain=domain)
-    geometry = graph.store(geometry, _MOVED, touched[1], is_touched, "FLOAT_VECTOR", domain)
+    geometry = graph.store(geometry, _MOVED, moved, is_touched, "FLOAT_VECTOR", domain)
     x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
     bent = graph.math("MULTIPLY", graph.vector("LENGTH", graph.combined(x.socket, y.socket), output="Value"), 2.0 / pi)
     return graph.store(geometry, BENT, bent, is_touched, domain=domain)
@@ -242,16 +272,19 @@ def _lean_and_shift(graph: NodeGraph, table: _Table) -> tuple[Any, Number, Any]:
     return toward, angle, _turned(graph, graph.combined(0.0, 0.0, z.socket), table.to_scatter)
 
 
-def _put(graph: NodeGraph, table: _Table, geometry: Any, position: Any) -> Any:
+def _put(graph: NodeGraph, table: _Table, geometry: Any, domain: str, position: Any) -> Any:
     """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length."""
     toward, angle, shift = _lean_and_shift(graph, table)
-    from_root = graph.vector("SUBTRACT", position, graph.attribute(_ROOT, "FLOAT_VECTOR"))
-    height = graph.number(graph.dot(from_root, table.up)).at_least(0.0)
     sine, cosine = (graph.number(graph.math(name, angle.socket)) for name in ("SINE", "COSINE"))
-    aside = graph.scaled(toward, (height * sine).socket)
-    down = graph.scaled(table.up, (height * (cosine - 1.0)).socket)
-    offset = graph.vector("ADD", graph.vector("ADD", aside, down), shift)
-    return graph.put(geometry, graph.attribute(_TOUCHED, "BOOLEAN"), position, offset)
+    lean = graph.vector("ADD", graph.scaled(toward, sine.socket), graph.scaled(table.up, (cosine - 1.0).socket))
+    is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
+    base = graph.dot(graph.attribute(_ROOT, "FLOAT_VECTOR"), table.up)
+    for name, value, kind in ((_LEAN, lean, "FLOAT_VECTOR"), (_SHIFT, shift, "FLOAT_VECTOR"), (_BASE, base, "FLOAT")):
+        geometry = graph.store(geometry, name, value, is_touched, kind, domain)
+    height = (graph.number(graph.dot(position, table.up)) - graph.number(graph.attribute(_BASE))).at_least(0.0)
+    aside = graph.scaled(graph.attribute(_LEAN, "FLOAT_VECTOR"), height.socket)
+    offset = graph.vector("ADD", aside, graph.attribute(_SHIFT, "FLOAT_VECTOR"))
+    return graph.put(geometry, is_touched, graph.vector("ADD", position, offset))
 
 
 def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any) -> Any:
@@ -276,27 +309,33 @@ def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any
     return geometry
 
 
-def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position: Any, touched: tuple[Any, Any]) -> Any:
-    """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices."""
+def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position: Any, latest: Any, moved: Any) -> Any:
+    """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices.
+
+    What each sum takes is stored first: a sum within another is worked out twice.
+    """
     parts = graph.node("GeometryNodeSeparateComponents")
     graph.link(geometry, parts.inputs["Geometry"])
     island = graph.node("GeometryNodeInputMeshIsland").outputs["Island Index"]
+    mesh = graph.store(parts.outputs["Mesh"], _PART, island, True, "INT")
+    part, low = graph.attribute(_PART, "INT"), graph.attribute(_LOW)
 
-    def total(value: Any, kind: str = "FLOAT") -> Any:
-        node = graph.accumulated(value, kind)
-        graph.link(island, node.inputs["Group ID"])
+    def total(value: Any) -> Any:
+        node = graph.accumulated(value, "FLOAT_VECTOR")
+        graph.link(part, node.inputs["Group ID"])
         return next(socket for socket in node.outputs if socket.name == "Total" and socket.enabled)
 
     height = graph.number(graph.dot(position, table.up))
-    low = graph.number(1.0)
+    among = graph.number(graph.math("ADD", 1.0, 0.0))
     for _ in range(MEANS):
-        mean = graph.number(total((height * low).socket)) / graph.number(total(low.socket))
-        low = 1.0 - height.above(mean + 1e-6)
-    share = graph.math("DIVIDE", 1.0, total(low.socket))
-    root = graph.scaled(total(graph.scaled(position, low.socket), "FLOAT_VECTOR"), share)
-    mesh = _stored(graph, parts.outputs["Mesh"], "POINT", root, touched, island)
-    mesh = _put(graph, table, mesh, position)
+        total_height, count, _ = graph.parts(total(graph.combined((height * among).socket, among.socket)))
+        mesh = graph.store(mesh, _LOW, (1.0 - height.above(total_height / count + 1e-6)).socket, True)
+        among = graph.number(low)
+    share = graph.math("DIVIDE", 1.0, graph.separated(total(graph.combined(low)))[0])
+    root = graph.scaled(total(graph.scaled(position, low)), share)
+    mesh = _stored(graph, mesh, "POINT", root, latest, moved, part)
+    mesh = _put(graph, table, mesh, "POINT", position)
     joined = graph.node("GeometryNodeJoinGeometry")
-    for part in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
-        graph.link(part, joined.inputs["Geometry"])
+    for piece in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
+        graph.link(piece, joined.inputs["Geometry"])
     return joined.outputs["Geometry"]

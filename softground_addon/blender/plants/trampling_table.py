@@ -77,24 +77,35 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     """Store the table in the attributes of vertices, each from the first on; lengths in cells."""
     stretch, scale, by = units.time_stretch, units.unit_scale_m, trampled.by
     rows, columns = trampled.tiles.shape
-    x, y = trampled.direction.T
-    size = trampled.cell_size
-    start, end = by.start * stretch, by.end * stretch
+    size, side = trampled.cell_size, trampled.tile
+    corner_row, corner_column = np.indices((rows, columns))
     pace = 1.0 / (scale * stretch)
+    active = trampled.active * stretch
     meta = (
-        (columns, trampled.tile, units.frame_rate * stretch),
-        (columns * trampled.tile - 1, rows * trampled.tile - 1, trampled.active.min() * stretch),
+        (columns, side, units.frame_rate * stretch),
+        (columns * side - 1, rows * side - 1, active.min()),
     )
-    sink = np.column_stack([trampled.sink / size, trampled.slope])
+    is_second = np.ones(len(active) + 2, bool)
+    is_second[trampled.first] = is_second[-2:] = False
+    following = np.where(is_second[1:-1], np.append(active[1:], NEVER), NEVER)
+    after = np.where(is_second[1:-1], np.append(following[1:], NEVER), NEVER)
+    second = is_second[:-2]
+    level = np.zeros(len(active))
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
         (nodes.META, "FLOAT_VECTOR", np.array(meta)),
-        (nodes.TILES, "INT", trampled.tiles.ravel()),
+        (nodes.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
         (nodes.FIRST, "INT", trampled.first),
-        (nodes.ACTIVE, "FLOAT", trampled.active * stretch),
-        (nodes.TIMES, "FLOAT_VECTOR", np.column_stack([start, end, by.reach])),
-        (nodes.LEAN, "FLOAT_VECTOR", np.column_stack([np.arctan2(y, x), by.lasting, by.above / scale])),
-        (nodes.PACE, "FLOAT_VECTOR", np.column_stack([by.down * pace, by.up * pace, by.passes])),
-        (nodes.SINK, "FLOAT_VECTOR", sink),
+        *(
+            (name, "FLOAT_VECTOR", np.column_stack(parts))
+            for name, parts in (
+                (nodes.ACTIVE, (active, following, after)),
+                (nodes.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
+                (nodes.PACE, (by.down * pace, by.up * pace, by.above / scale)),
+                (nodes.LEAN, (trampled.direction, level)),
+                (nodes.SHARES, (by.reach, by.lasting, second)),
+                (nodes.SINK, (trampled.slope, trampled.sink / size)),
+            )
+        ),
     )
     count = max(len(values) for _, _, values in arrays) + 1
     vertices.vertices.add(count)

@@ -63,6 +63,15 @@ class SoftGroundHardGround(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=is_mesh,
     )
+    wet: EnumProperty(
+        name="Wet With",
+        description="What soles that step onto it take up, and leave on the hard ground after it",
+        items=(
+            ("NONE", "Dry", "It is dry"),
+            ("WATER", "Water", "A puddle, wet stone: prints of water, which dry without a trace"),
+            ("PAINT", "Paint", "Paint or blood, in the colour of the material of the marks"),
+        ),
+    )
 
 
 class SoftGroundSettings(bpy.types.PropertyGroup):

@@ -47,15 +47,19 @@ def with_hard_objects(
     """
     reach = reach_of(motions)
     listed_tops = yield from _tops(wanted.hard_grounds, wanted, bounds)
-    hard = [*hard_parts, *(top for _, top in listed_tops)]
-    terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach) if hard else ground
+    hard, wet = [*hard_parts, *(top for _, top in listed_tops)], dict[str, MeshTerrain]()
+    liquids = dict(zip(wanted.hard_grounds, wanted.wet_grounds, strict=False))
+    for liquid in sorted({*wanted.wet_grounds} - {""}):
+        pools = [top for name, top in listed_tops if liquids[name] == liquid]
+        wet |= {liquid: (yield from MeshTerrain.joined.slices(pools))} if pools else {}
+    terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach, wet) if hard else ground
     raised = [rest for motion in motions for rest in raised_rests(motion, terrain)]
     yield
     shown = yield from _tops(_still_meshes(scene, wanted, raised) if raised else (), wanted, bounds)
     carried = [(name, top, rests) for name, top in shown if (rests := carried_by(top.heights, raised, terrain))]
     if carried:
         hard += [top for _, top, _ in carried]
-        terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach)
+        terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach, wet)
     return terrain, [_finding(name.name, rests) for name, _, rests in carried]
 
 

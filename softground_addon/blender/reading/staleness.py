@@ -205,6 +205,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         "marks": True,
         "carve": True,
         "hard_grounds": (),
+        "wet_grounds": (),
         "regions": (),
         "gravity_direction": DOWN,
         "under": "AUTO",

@@ -14,7 +14,8 @@ from ..events.phases import normal_force, slide_speed
 from ..ground import surfaces
 from ..ground.hard_ground import HardOnSoft
 from ..ground.heightfield import Terrain
-from ..ground.surfaces import CarriedFilm
+from ..ground.surfaces import Liquid, SurfaceRecord
+from ..ground.terrain import SAME_LAYER
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
@@ -50,8 +51,12 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
-    surface : str
-        What they are of.
+    share : (V,) float array
+        Of the film on the sole that is left there.
+    zone : (V,) int array
+        See `film.ZONES`.
+    floors : FloorSteps
+        From which the mass follows.
     """
 
     position: Array
@@ -62,18 +67,115 @@ class Marks:
     sole: Array
     tread: Array
     step: NDArray[np.intp]
+    share: Array
+    zone: NDArray[np.intp]
+    floors: FloorSteps
     carried: CarriedMass = field(default_factory=CarriedMass)
-    surface: str = ""
+
+    def with_steps(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> Marks:
+        """The same marks with the mass that they have after other steps on the soft ground; see `FloorSteps.films`."""
+        films, booked = self.floors.films(steps, shed)
+        each = np.array([films[number] for number in range(len(films))]).reshape(-1, len(ZONES))
+        return replace(self, mass=each[self.step, self.zone] * self.share, carried=booked)
+
+
+@dataclass(frozen=True)
+class SoleOnFloors:
+    """The way of a sole over hard floors, whatever it carries.
+
+    Attributes
+    ----------
+    of : (str, str)
+        Character and sole.
+    areas : (4,) float array
+        Of its zones [m²].
+    last_frame : float
+        Of the shot.
+    dirty : float
+        Film as the shot starts, over the thickest.
+    meetings : sequence of Meeting
+        With hard floors, in the order of time.
+    marks : sequence of int
+        Number of the mark that each of these leaves; -1 of none.
+    """
+
+    of: tuple[str, str]
+    areas: Array
+    last_frame: float
+    dirty: float
+    meetings: tuple[Meeting, ...]
+    marks: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FloorSteps:
+    """Steps of all soles on hard floors: what they leave follows from these and the steps on soft ground.
+
+    Attributes
+    ----------
+    kind, ground : str
+        What they carry, and what the ground is made of where a step does not say.
+    soles : sequence of SoleOnFloors
+    """
+
+    kind: str
+    ground: str
+    soles: tuple[SoleOnFloors, ...]
+
+    def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
+        """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
+
+        Parameters
+        ----------
+        steps : sequence of EditableStep
+            On the soft ground, as the artist leaves them.
+        shed : mapping of int to float
+            Volume that each sheds in the air, by its number [m³].
+        """
+        carried = surfaces.sticking(self.kind).carried
+        assert carried is not None
+        films: dict[int, Array] = {}
+        booked = CarriedMass()
+        for sole in self.soles:
+            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
+            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
+            giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
+            films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
+            booked += of_sole
+        return films, booked
+
+    def _soft_meetings(
+        self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
+    ) -> Iterator[Meeting]:
+        """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
+        density = surfaces.sticking(self.kind).density
+        for step in steps:
+            if step.left is None or step.is_copy or (step.left.character, step.left.sole) != sole.of:
+                continue
+            if (step.left.surface or self.ground) == self.kind and step.left.end_frame < sole.last_frame:
+                yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
 
 
 @dataclass(frozen=True)
 class _Contact:
-    """A contact of a sole with a hard floor: as it meets it, where it lies, the share each node leaves, its frames."""
+    """A contact of a sole with a hard floor: where it lies, its slide in sole lengths, frames, and what wets it."""
 
-    meeting: Meeting
     laid: HardPrint
-    shares: Array
+    slid: float
     frames: Array
+    wet: str
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """A mark, its faces, and the values of its vertices as `Marks` has them."""
+
+    number: int
+    faces: NDArray[np.intp]
+    values: dict[str, Any]
+
+
+_COLUMNS = ("position", "birth", "mass", "area", "sole", "tread", "share", "zone")
 
 
 @sliced
@@ -87,65 +189,83 @@ def marks_of(
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
     brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
-    """What soles leave on the hard floors of a shot; None where there is none, or the ground does not stick.
+    """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
+
+    Of several grounds and liquids that stick, that of which most is left.
 
     Parameters
     ----------
     steps : sequence of EditableStep
         On the soft ground, as the artist leaves them: those that are muted are not stepped into.
     surface : str
-        What soles take up, of all that the ground is made of.
+        What the ground is made of; a step in another kind of it says so.
     shed : mapping of int to float, optional
-        Mass that each step sheds in the air, by its number [kg].
+        Volume that each step sheds in the air, by its number [m³].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
     brought : mapping of str to float, optional
-        Film on the soles of a character as the shot starts, over the thickest, by its name.
+        Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
     """
-    carried = surfaces.find(surface).carried
-    if carried is None or not isinstance(terrain, HardOnSoft):
+    if not isinstance(terrain, HardOnSoft):
         return None
-    parts: list[Marks] = []
-    booked, count = CarriedMass(), 0
+    kinds = dict.fromkeys([surface, *(step.left.surface for step in steps if step.left and step.left.surface)])
+    sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
+    sticking = [kind for kind in sticking if kind.carried is not None]
+    if not sticking:
+        return None
+    laid_out: list[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]] = []
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             yield
-            if motion.sole.prop is not None:
-                continue
-            sticky = [step for step in steps if step.left and step.left.surface in ("", surface)]
-            soft = list(_soft_meetings(character, index, sticky, shed))
-            hard = character.contacts.hard
-            dirty = brought.get(character.motion.name, 0.0)
-            if not (soft or dirty) or hard is None or not hard[:, index].any():
+            of, hard = (character.motion.name, motion.sole.name), character.contacts.hard
+            dirty = brought.get(of[0], 0.0)
+            on_soft = any((step.baked.character, step.baked.sole) == of for step in steps)
+            takes = on_soft or dirty or terrain.wet
+            if not takes or motion.sole.prop is not None or hard is None or not hard[:, index].any():
                 continue
             grid = sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
             for during in _pieces(hard[:, index], slid := _slid(character, index)):
-                contacts.append(_contact(character, index, grid, during, slid, terrain, carried))
+                contacts.append(_contact(character, index, grid, during, slid, terrain))
                 yield
-            meetings = sorted([*soft, *(contact.meeting for contact in contacts)], key=lambda meeting: meeting.frame)
-            giving, of_sole = carry(meetings, carried, _by_zone(grid, grid.area), dirty)
-            booked += of_sole
-            given = {id(meeting): film for meeting, film in zip(meetings, giving, strict=True)}
-            for contact in contacts:
-                film = given[id(contact.meeting)]
-                if (film[grid.zone] * contact.shares > 0).any():
-                    depth = treads.get((character.motion.name, motion.sole.name), 0.0)
-                    parts.append(_mark(grid, contact, film, count, depth))
-                    count += 1
-    return replace(_joined(parts, booked), surface=surface)
+            sole = SoleOnFloors(of, _by_zone(grid, grid.area), float(character.motion.frames[-1]), dirty, (), ())
+            laid_out.append((grid, contacts, sole, treads.get(of, 0.0)))
+    whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
+    return max(whole, key=lambda marks: marks.carried.left_behind, default=None)
 
 
-def _soft_meetings(
-    character: CharacterLoads, index: int, steps: Sequence[EditableStep], shed: Mapping[int, float]
-) -> Iterator[Meeting]:
-    """A sole as it leaves the soft ground, which it does not with its last step if that goes on to the end."""
-    of_sole = character.motion.name, character.motion.soles[index].sole.name
-    for step in steps:
-        if step.left is None or step.is_copy or (step.left.character, step.left.sole) != of_sole:
-            continue
-        if step.left.end_frame < character.motion.frames[-1]:
-            yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0))
+def _of_kind(
+    kind: SurfaceRecord | Liquid,
+    ground: str,
+    laid_out: Sequence[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]],
+    steps: Sequence[EditableStep],
+    shed: Mapping[int, float],
+) -> Marks:
+    """All marks of one kind, of steps that are muted, too: those weigh nothing."""
+    assert kind.carried is not None
+    parts: list[_Mark] = []
+    soles = []
+    for grid, contacts, sole, tread in laid_out:
+        meetings, marks = [], []
+        for contact in sorted(contacts, key=lambda each: each.frames[0]):
+            is_wet = contact.wet == kind.name
+            share = share_left(contact.laid.pressure, kind.carried, contact.slid)
+            of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)
+            meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), of_zones))
+            marks.append(-1 if is_wet else len(parts))
+            parts += [] if is_wet else [_mark(grid, contact, share, tread, len(parts))]
+        dirty = sole.dirty if kind.name == ground else 0.0
+        soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
+    floors = FloorSteps(kind.name, ground, tuple(soles))
+    at_most, _ = floors.films([replace(step, left=step.baked) for step in steps if not step.is_copy], {})
+    parts = [
+        part for number, part in enumerate(parts) if (at_most[number][part.values["zone"]] * part.values["share"]).any()
+    ]
+    numbers = {part.number: number for number, part in enumerate(parts)}
+    floors = replace(
+        floors, soles=tuple(replace(sole, marks=tuple(numbers.get(mark, -1) for mark in sole.marks)) for sole in soles)
+    )
+    return _joined(parts, floors).with_steps(steps, shed)
 
 
 def _slid(character: CharacterLoads, index: int) -> Array:
@@ -163,13 +283,7 @@ def _pieces(hard: NDArray[np.bool_], slid: Array) -> Iterator[slice]:
 
 
 def _contact(
-    character: CharacterLoads,
-    index: int,
-    grid: SoleGrid,
-    during: slice,
-    slid: Array,
-    terrain: HardOnSoft,
-    carried: CarriedFilm,
+    character: CharacterLoads, index: int, grid: SoleGrid, during: slice, slid: Array, terrain: HardOnSoft
 ) -> _Contact:
     motion = character.motion
     steps = np.arange(during.start, during.stop, max(1, (during.stop - during.start) // LOOKED_AT))
@@ -178,36 +292,40 @@ def _contact(
     poses[..., :3, 3] -= lift[:, None]  # the float or sink of the source
     force, tolerance = normal_force(character, index)[steps], LEAVE_HEIGHT * motion.leg_length
     print_ = laid(grid, poses, force, terrain, tolerance)
-    shares = share_left(print_.pressure, carried, float(slid[during.stop - 1] - slid[during.start]))
-    of_zones = _by_zone(grid, shares * grid.area) / np.maximum(_by_zone(grid, grid.area), 1e-300)
-    frames = motion.frames[steps]
-    return _Contact(Meeting(float(frames[0]), of_zones), print_, shares, frames)
+    x, y, z = print_.position.T
+    weight = print_.pressure * grid.area
+    wet = ""
+    for liquid, floor in terrain.wet.items():
+        on_it = np.abs(floor.heights(x, y, z) - z) < SAME_LAYER
+        wet = liquid if weight[on_it].sum() > 0.5 * weight.sum() else wet
+    return _Contact(print_, float(slid[during.stop - 1] - slid[during.start]), motion.frames[steps], wet)
 
 
 def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, film: Array, number: int, tread: float) -> Marks:
-    """The mark of one contact that takes its shares of a film (4,) [kg/m²]."""
+def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number: int) -> _Mark:
+    """The mark of one contact that leaves a share at each node of the grid."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
-    return Marks(
-        contact.laid.position[used],
-        faces.reshape(-1, 4),
-        contact.frames[contact.laid.touched[used]],
-        (film[grid.zone] * contact.shares)[used],
-        grid.area[used],
-        grid.sole[used],
-        np.full(len(used), tread),
-        np.full(len(used), number),
-    )
+    values = {
+        "position": contact.laid.position[used],
+        "birth": contact.frames[contact.laid.touched[used]],
+        "mass": np.zeros(len(used)),
+        "area": grid.area[used],
+        "sole": grid.sole[used],
+        "tread": np.full(len(used), tread),
+        "share": share[used],
+        "zone": grid.zone[used],
+    }
+    return _Mark(number, faces.reshape(-1, 4), values)
 
 
-def _joined(parts: Sequence[Marks], carried: CarriedMass) -> Marks:
-    first = np.cumsum([0, *(len(part.position) for part in parts)])
-    none, places, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.intp)
-    nothing = Marks(places, np.zeros((0, 4), np.intp), none, none, none, places, none, numbers)
-    names = ("position", "birth", "mass", "area", "sole", "tread", "step")
-    whole: Any = {name: np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names}
+def _joined(parts: Sequence[_Mark], floors: FloorSteps) -> Marks:
+    first = np.cumsum([0, *(len(part.values["mass"]) for part in parts)])
+    none, places = np.zeros(0), np.zeros((0, 3))
+    nothing = dict.fromkeys(_COLUMNS, none) | {"position": places, "sole": places, "zone": np.zeros(0, np.intp)}
+    whole: Any = {name: np.concatenate([nothing[name], *(part.values[name] for part in parts)]) for name in _COLUMNS}
     faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
-    return Marks(faces=np.concatenate([nothing.faces, *faces]), **whole, carried=carried)
+    faces = np.concatenate([np.zeros((0, 4), np.intp), *faces])
+    return Marks(faces=faces, step=np.repeat(np.arange(len(parts)), np.diff(first)), floors=floors, **whole)

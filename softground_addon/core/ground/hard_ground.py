@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -83,11 +84,14 @@ class HardOnSoft:
         Upper sides of the hard objects.
     reach : Reach
         Up to where soles can stand on them.
+    wet : mapping of str to MeshTerrain
+        Those of the hard objects that are wet, by the name of the liquid (`surfaces.LIQUIDS`).
     """
 
     ground: Terrain
     hard: MeshTerrain
     reach: Reach | _Lower
+    wet: Mapping[str, MeshTerrain] = field(default_factory=dict)
 
     def heights(self, x: Array, y: Array) -> Array:
         """Heights of the highest surface within reach at world positions [m], NaN where there is none."""

@@ -155,8 +155,24 @@ class CarriedFilm:
     water: float
 
 
-CARRIED_KINDS = ("mud", "sand", "snow")
+CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
 """What soles carry, in the order of the numbers by which marks name it."""
+
+
+@dataclass(frozen=True)
+class Liquid:
+    """What wets hard floors; its fields are those of `SurfaceRecord`."""
+
+    name: str
+    density: float
+    colour: Triple
+    carried: CarriedFilm
+    melts: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name that the user sees."""
+        return self.name.title()
 
 
 @dataclass(frozen=True)
@@ -302,6 +318,21 @@ HARD_VOICE = Voice(1.0, 0.15, 0.5, 0.0, (350, 2600), (0.002, 0.009), 0.0, 1.5, (
 """Sound of a shoe on it: most of the power of such steps lies below 2.5 kHz and within 30 ms of the strike (by ear)."""
 HARD_NOTE = 56
 """As `SurfaceRecord.midi_note`."""
+
+
+LIQUIDS = {
+    liquid.name: liquid
+    for liquid in (
+        Liquid("water", 1000.0, (0.1, 0.1, 0.1), CarriedFilm("water", most=0.1, taken=0.1, left=0.35, water=1.0)),
+        Liquid("paint", 1200.0, (0.25, 0.006, 0.004), CarriedFilm("paint", most=0.25, taken=0.2, left=0.35, water=0.5)),
+    )
+}
+"""What hard floors are wet with, by name; the colour of paint is the artist's to change."""
+
+
+def sticking(name: str) -> SurfaceRecord | Liquid:
+    """The surface or liquid of that name; errors as of `find`."""
+    return LIQUIDS.get(name) or find(name)
 
 
 def find(name: object, origin: str = "Ground") -> SurfaceRecord:

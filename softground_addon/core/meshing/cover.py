@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from math import ceil, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.terrain import MeshTerrain
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from ..numerics.arrays import Array, Indices
 
 STEEPEST = np.radians(50.0)
 """Slope on which nothing stays [rad]: fresh snow lies on roofs of up to about 50 degrees."""

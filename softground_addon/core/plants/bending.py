@@ -22,6 +22,8 @@ MOST_LASTING = 0.95
 """Share of lying flat that stays for good, at most: broken stems spring up a little."""
 BRUSHED = 0.35
 """Share of the bend that is left by a sole which passes above the ground."""
+NO_ONE, EVERYONE = 0.0, 2.0
+"""Chances of a blade that is never worn down, and of one that always is."""
 _TOUCHING = 1e-6
 """Clearance below which a sole lies on the root [m]."""
 
@@ -159,4 +161,4 @@ def bend(by: Pass, plant: Plant, frame: Any, frame_rate: Any, chance: Any) -> tu
     lasting = 1.0 - np.greater(by.above, 0.0) * (1.0 - BRUSHED)
     rising = (stays + (released - stays) * remaining) * np.greater(since, 0.0) * lasting
     weight = np.maximum(holds, np.greater(frame, by.start) * lasting)
-    return np.maximum(holds, rising) * by.reach, weight
+    return np.maximum(holds, rising) * by.reach, weight * by.reach

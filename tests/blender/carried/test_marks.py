@@ -17,7 +17,7 @@ from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
 from softground_addon.core.weather import weather
-from tests.blender.ground.test_hard_ground import listed, over_a_crate
+from tests.blender.ground.test_hard_ground import LOW, box, listed, over_a_crate
 from tests.blender.grounds import bake, heights
 
 HEIGHT = 0.2
@@ -108,6 +108,20 @@ def test_marks_dry_as_weather_dries_them(scene):
     assert 0 < np.mean(wet[mass > 0]) < 1
 
 
+def test_rain_keeps_marks_wet_and_washes_them_off(scene):
+    obj = marks_object.of(scene.softground.ground)
+    before = values(at(scene, 84), "mass")
+    set_input(obj, "Drying", 0.5)
+    set_input(obj, "Rain", 20.0)
+    set_input(obj, "Time Scale", 600.0)
+    mesh = at(scene, 84)
+    fallen = 20.0 / 3600.0 * 600.0 * (84 - values(mesh, "birth")) / 24
+    assert values(mesh, "mass") == pytest.approx(before * np.exp(-0.18 * fallen), rel=1e-4)
+    assert (values(mesh, "wetness") == 1.0).all()
+    set_input(obj, "Rain", 0.0)
+    assert (values(at(scene, 84), "mass") == before).all()
+
+
 def test_they_play_without_the_add_on(scene, baked):
     script = (
         f"import bpy\nbpy.ops.wm.open_mainfile(filepath={str(baked[0])!r})\n"
@@ -189,18 +203,54 @@ def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
     assert bake_report.stale_reasons(scene) == ()
 
 
+def test_soles_take_up_what_wets_hard_ground_and_a_bake_without_it_is_outdated(scene):
+    options = scene.softground
+    listed(box(scene, "Path", 0.002, y=(-4.5, LOW - 0.3), bottom=-0.5))
+    options.material.surface = "sand"  # which does not stick
+    assert "carried_kg" not in bake(scene).report["totals"]
+    assert marks_object.of(options.ground) is None
+    options.hard_grounds[0].wet = "PAINT"
+    assert "The settings have changed" in bake_report.stale_reasons(scene)
+    carried = bake(scene).report["totals"]["carried_kg"]
+    obj = marks_object.of(options.ground)
+    assert carried["picked_up"] == pytest.approx(carried["left_behind"] + carried["on_soles"], abs=1e-9)
+    assert {value.value for value in obj.data.attributes["kind"].data} == {CARRIED_KINDS.index("paint")}
+    assert bake_report.stale_reasons(scene) == ()
+
+
 def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
     assert bake_report.stale_reasons(scene) == ()
     scene.softground.marks = False
     assert bake_report.stale_reasons(scene) == ("The settings have changed",)
 
 
-def test_marks_stay_while_steps_on_the_ground_are_edited(scene):
-    ground = scene.softground.ground
-    before = mesh_arrays.positions(marks_object.of(ground).data).tobytes()
-    editing = jobs.run(step_edits.reading(scene))
-    jobs.run(step_edits.editing(scene, editing, {baked_ground.steps_of(ground)[0].name: StepEdit(strength=0.5)}))
-    assert mesh_arrays.positions(marks_object.of(ground).data).tobytes() == before
+def edit(scene, edits):
+    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), edits))
+
+
+def state_of(obj):
+    return mesh_arrays.positions(obj.data), np.maximum(values(obj.data, "mass"), 0.0)
+
+
+def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(scene):
+    obj, frame = marks_object.of(scene.softground.ground), 84
+    before, count = state_of(obj), len(at(scene, frame).vertices)
+    names = [step.name for step in baked_ground.steps_of(scene.softground.ground)]
+    edit(scene, {names[0]: StepEdit(mute=True)})
+    fewer = state_of(obj)
+    assert 0.0 < fewer[1].sum() < before[1].sum()
+    carried = bake(scene).report["totals"]["carried_kg"]
+    again = state_of(marks_object.of(scene.softground.ground))
+    assert again[1] == pytest.approx(fewer[1], abs=1e-6)
+    assert again[0] == pytest.approx(fewer[0], abs=1e-6)
+    assert carried["picked_up"] == pytest.approx(sum(carried.values()) - carried["picked_up"], abs=1e-9)
+    edit(scene, {name: StepEdit(mute=True) for name in names})
+    assert not state_of(obj)[1].any()
+    assert len(at(scene, frame).vertices) == 0
+    edit(scene, {})
+    assert state_of(obj)[1] == pytest.approx(before[1], abs=1e-6)
+    assert state_of(obj)[0] == pytest.approx(before[0], abs=1e-6)
+    assert len(at(scene, frame).vertices) == count
 
 
 @pytest.mark.parametrize(
@@ -214,7 +264,7 @@ def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, s
     ground = scene.softground.ground
     counts = {frame: len(at(scene, frame).vertices) for frame in (60, 84)}
     path = tmp_path / f"shot.{suffix}"
-    write(scene, ground, path, 58, 84)
+    write(ground, path, 58, 84)
     known = set(bpy.data.objects)
     read(str(path))
     found = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]

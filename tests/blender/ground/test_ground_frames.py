@@ -55,8 +55,7 @@ def posed(scene):
     return np.array(heads)
 
 
-@pytest.mark.parametrize("parented", [False, True])
-@pytest.mark.parametrize("where", WHERE)
+@pytest.mark.parametrize(("where", "parented"), [("on_a_map", False), ("on_a_wall", False), ("askew_on_a_map", True)])
 def test_a_bake_is_the_same_wherever_the_shot_is(short_walk, where, parented):
     scene = short_walk
     field(scene)
@@ -148,8 +147,7 @@ def rising(time):
     return (0, 0, time * time), (0, 0, 0)
 
 
-@pytest.mark.parametrize("keyed", [still, sailing])
-@pytest.mark.parametrize("away", [False, True])
+@pytest.mark.parametrize(("keyed", "away"), [(still, False), (sailing, False), (sailing, True)])
 def test_prints_on_a_deck_that_is_still_or_sails_evenly_are_those_without_a_deck(short_walk, keyed, away):
     deck(short_walk)
     if away:

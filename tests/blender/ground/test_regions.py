@@ -345,9 +345,9 @@ def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, 
     assert bake_report.stale_reasons(four) == ("The settings have changed",)
     bake(four)
     assert set(depths_of_layers(ground)[0]) == {np.float32(four.softground.material.layer_depth)}
-    editable = step_edits.editable(four)
+    editable = jobs.run(step_edits.reading(four))
     assert editable.made_with.under == "ALWAYS"
-    step_edits.edit(four, editable, {editable.left.steps[0].name: StepEdit(mute=True)})
+    jobs.run(step_edits.editing(four, editable, {editable.left.steps[0].name: StepEdit(mute=True)}))
     assert depths_of_layers(ground) is not None
     four.softground.under = "AUTO"
     thin = replace(presets.find("mud"), material=replace(presets.find("mud").material, layer_depth=0.04))

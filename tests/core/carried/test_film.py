@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.carried.film import PRESSING, TRACE, Meeting, carry, share_left, taken_up, zone_of
-from softground_addon.core.ground.surfaces import CARRIED_KINDS, SURFACES
+from softground_addon.core.ground.surfaces import CARRIED_KINDS, LIQUIDS, SURFACES
 
 FILMS = {name: record.carried for name, record in SURFACES.items() if record.carried}
 MUD = FILMS["mud"]
@@ -17,7 +17,7 @@ def on_floor(*shares):
 
 def test_mud_wet_sand_and_snow_stick_and_what_is_dry_does_not():
     assert set(FILMS) == {"mud", "wet_sand", "snow"}
-    assert {film.kind for film in FILMS.values()} == set(CARRIED_KINDS)
+    assert {film.kind for film in FILMS.values()} | set(LIQUIDS) == set(CARRIED_KINDS)
 
 
 @pytest.mark.parametrize("film", FILMS.values(), ids=FILMS)

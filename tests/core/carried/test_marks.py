@@ -10,6 +10,7 @@ from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded,
 from softground_addon.core.carried.marks import _pieces, marks_of
 from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
 from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.surfaces import LIQUIDS
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.record.record import steps_of
@@ -30,8 +31,9 @@ def crossing(steps=12, onto=2.5, ends=9.0):
     return loads, footprints, terrain
 
 
-def marks(surface="mud", muted=(), **options):
+def marks(surface="mud", muted=(), wet=None, **options):
     loads, footprints, terrain = crossing()
+    terrain = replace(terrain, wet=wet or {})
     steps = steps_of(footprints, {}, {}, {})
     steps = [replace(step, left=None) if step.index in muted else step for step in steps]
     return marks_of([loads], steps, terrain, surface=surface, **options)
@@ -82,7 +84,7 @@ def test_a_sole_over_an_edge_leaves_its_mark_on_the_floor_alone():
 
 
 def test_a_walk_out_of_mud_leaves_marks_that_fade_and_every_gram_is_booked():
-    found = marks(shed={0: 0.01, 3: 0.02})
+    found = marks(shed={0: 0.01 / 1700.0, 3: 0.02 / 1700.0})
     of_steps = mass_of_steps(found)
     assert len(of_steps) >= 4
     for foot in (of_steps[: len(of_steps) // 2], of_steps[len(of_steps) // 2 :]):
@@ -129,7 +131,7 @@ def test_dirty_soles_leave_marks_though_they_step_into_nothing():
     loads, footprints, _ = crossing()
     muted = range(len(footprints))
     clean, dirty = marks(muted=muted), marks(muted=muted, brought={loads.motion.name: 0.8})
-    assert not len(clean.position)
+    assert not clean.mass.any()
     assert dirty.carried.brought > 0 == dirty.carried.picked_up
     assert mass_of_steps(dirty).sum() == pytest.approx(dirty.carried.brought - dirty.carried.on_soles, abs=1e-9)
 
@@ -139,5 +141,42 @@ def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():
     whole, fewer, none = marks(), marks(muted=(0, 1)), marks(muted=range(count))
     assert fewer.carried.picked_up < whole.carried.picked_up
     assert fewer.carried.left_behind < whole.carried.left_behind
-    assert not len(none.position)
+    assert not none.mass.any()
     assert none.carried.picked_up == 0.0
+
+
+@pytest.mark.parametrize("liquid", LIQUIDS)
+def test_soles_that_step_into_a_puddle_carry_it_on_and_leave_no_mark_in_it(liquid):
+    puddle = slab((3.0, 4.2), (-1, 1), FLOOR)
+    found = marks("sand", wet={liquid: puddle})
+    film, of_steps = LIQUIDS[liquid].carried, mass_of_steps(found)
+    assert found.floors.kind == liquid
+    assert len(of_steps) >= 3
+    assert (np.diff(of_steps) < 0).all()
+    inside = (found.position[:, 0] > 3.0) & (found.position[:, 0] < 4.2)
+    assert np.bincount(found.step, inside, len(of_steps)).max() < 0.5 * np.bincount(found.step).max()
+    carried = found.carried
+    assert of_steps.sum() == pytest.approx(carried.left_behind, abs=1e-9)
+    assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
+    assert found.mass.max() <= film.most * film.left
+    assert marks("sand") is None
+
+
+def test_of_mud_and_a_puddle_what_is_most_is_left():
+    puddle = {"water": slab((3.0, 4.2), (-1, 1), FLOOR)}
+    assert marks("mud", wet=puddle).floors.kind == "mud"
+    assert mass_of_steps(marks("mud", wet=puddle)) == pytest.approx(mass_of_steps(marks("mud")))
+
+
+def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
+    _, footprints, _ = crossing()
+    steps = steps_of(footprints, {}, {}, {})
+    whole = marks()
+    for muted in ((0,), (0, 1, 2), range(len(steps)), ()):
+        edited = [replace(step, left=None) if step.index in muted else step for step in steps]
+        found, anew = whole.with_steps(edited, {1: 1e-5}), marks(muted=muted, shed={1: 1e-5})
+        assert found.mass == pytest.approx(anew.mass, abs=1e-12)
+        carried = found.carried
+        assert carried == anew.carried
+        assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
+        assert mass_of_steps(found).sum() == pytest.approx(carried.left_behind, abs=1e-9)

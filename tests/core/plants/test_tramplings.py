@@ -70,6 +70,12 @@ def test_stiff_plants_spring_back_and_what_brushes_them_leaves_less():
     assert brushed == pytest.approx(bending.BRUSHED * angle(TREAD, GRASS, after))
 
 
+def test_what_hardly_reaches_a_blade_leaves_it_as_it_was_bent_before():
+    for reach in (0.0, 0.1, 1.0):
+        _, weight = bend(replace(TREAD, reach=reach), GRASS, np.array([15.0, 25.0]), 25.0, 0.0)
+        assert weight == pytest.approx(reach)
+
+
 def test_presets_are_of_the_trials():
     assert all(0 <= plant.stiffness <= 1 and 75 <= plant.half_after <= 300 for _, plant in PLANTS.values())
 
@@ -162,6 +168,26 @@ def test_blades_lean_where_the_foot_travels_and_outward_beside_it(steps):
     under = table.latest(*places_of(step))
     assert (table.direction[under] @ (np.cos(step.heading), np.sin(step.heading))).min() > 0
     np.testing.assert_allclose(np.linalg.norm(table.direction, axis=1), 1.0, atol=1e-6)
+
+
+def test_legs_part_tall_grass_to_both_sides_of_their_way_and_leave_short_grass(steps):
+    one, after = (step for step in steps if step.sole == steps[0].sole)
+    ahead = after.position[:2] - one.position[:2]
+    ahead /= np.linalg.norm(ahead)
+    aside, middle = np.array((-ahead[1], ahead[0])), (one.position[:2] + after.position[:2]) / 2
+    table = tramplings([one, after])
+    tall, short = Plant(1.5, 0.5, 20.0, 0.4, 100.0), replace(GRASS, height=SWING_HEIGHT)
+    for side in (-1.0, 1.0):
+        for away in (0.08, 0.11):
+            number = table.latest(*(middle + side * away * aside)[:, None])[0]
+            by = Pass(*(values[number] for values in vars(table.by).values()))
+            assert table.direction[number] @ aside == pytest.approx(side)
+            assert 10.0 < angle(by, tall, (by.start + by.end) / 2) < 40.0
+            assert angle(by, short, (by.start + by.end) / 2) == 0.0
+            closing = angle(by, tall, by.end + 25.0 * np.array([5.0, 60.0, 300.0]))
+            assert (np.diff(closing) < 0).all()
+            assert closing[-1] < 0.1
+    assert table.latest(*(middle + 0.4 * aside)[:, None])[0] == -1
 
 
 def test_without_a_print_there_is_no_table(steps):
