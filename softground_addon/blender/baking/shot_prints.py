@@ -25,8 +25,8 @@ from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
 from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
-from ..kept import kept
 from ..reading.shots import Shot
+from ..kept import kept
 from .publish import marks_left, with_debris
 
 _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
@@ -87,7 +87,8 @@ def _pressed(
     wanted: BakeSettings, shot: Shot, stood: _Stood, ground: SoftGround, edits: Mapping[str, StepEdit]
 ) -> Job[ShotPrints]:
     at_end, factors = Progress("simulate", 1.0), shot.surface.factors if shot.surface else None
-    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
+    seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
+    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
     carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
