@@ -26,7 +26,7 @@ from ...core.settings import Acts, BakeSettings
 from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
 from ..reading.shots import Shot
-from ..kept import kept
+from ..reuse import reused
 from .publish import marks_left, with_debris
 
 _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
@@ -70,12 +70,12 @@ def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Map
         return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), ground, edits))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, ground.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
-    stood = yield from kept(begun, "loads", source, _stood(wanted, shot))
+    stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
     painted = ground.variation, ground.regions  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, ground, edits)
-    return (yield from kept(begun, "prints", (read, before, after, painted, edits, skins), pressing))
+    return (yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing))
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
