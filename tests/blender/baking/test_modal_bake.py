@@ -14,6 +14,7 @@ from softground_addon.blender.operators import modal_bake, modal_job
 from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
+from softground_addon.core.composers import pressed_shot
 from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
 from tests.blender.redraws import fill, least_seconds, walk_over_all_objects
@@ -97,6 +98,18 @@ def test_prints_are_shown_as_they_are_pressed_where_somebody_looks_on(scene):
     assert len(record.footprints) == len(state.pressing.footprints) > 0
     session.show_no_bake()
     assert state.pressing is None
+
+
+def test_each_print_is_shown_once_where_bodies_lean(scene, monkeypatch):
+    prepare(scene, "fine")
+    scene.softground.tilt.use = True
+    monkeypatch.setattr(pressed_shot, "leans_anew", lambda now, before: before is None)
+    reuse.forget()
+    session.show_bake(0.0, "")
+    jobs.run(bake_job.bake(scene))
+    shown = len(state.pressing.footprints)
+    session.show_no_bake()
+    assert shown == len(baked_ground.record_of(scene.softground.ground).footprints)
 
 
 def pictures_of(scene, folder):
