@@ -3,7 +3,7 @@ where gravity points elsewhere."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import bpy
@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.ground_frame import Array, GroundFrame, axes_of, rows, upright
-from ...core.motion.ground_ride import GroundRide
+from ...core.motion.ground_ride import EVEN, GroundRide
 from ...core.numerics.rigid import unit
 from ...core.rig.recording import SceneUnits
 from ...core.settings import BakeSettings
@@ -62,11 +62,7 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
     units = replace(settings.units_of(scene), frame=GroundFrame(rows(np.linalg.inv(from_origin))))
-    matrices = jobs.run(_path(scene, ground, frames, units))
-    matrices[:, :3] /= scale
-    matrices = from_origin @ matrices
-    if not np.ptp(matrices, axis=0).any():
-        return None
+    matrices, *of_hard = jobs.run(_paths(scene, [ground, *map(settings.found, wanted.hard_grounds)], frames, units))
     axes = axes_of(matrices)
     shape = np.swapaxes(axes, -1, -2) @ matrices[:, :3, :3]
     if np.ptp(shape, axis=0).max() > STIFF * np.abs(shape).max():
@@ -74,6 +70,17 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
             f"Ground '{name}' changes its size in these frames: take the keys off its scale, and off those of its "
             "parents, or choose a copy without them."
         )
+    rounding = EVEN * np.spacing(np.abs(from_origin[:3, 3] + matrices[:, :3, 3]).max().astype(np.float32))
+    for hard, path in zip(wanted.hard_grounds, of_hard, strict=True):
+        beside = np.swapaxes(axes, -1, -2) @ (path - matrices)[:, :3]
+        if np.ptp(beside, axis=0).max() > STIFF * np.abs(beside).max() + rounding:
+            raise InputError(
+                f"'{hard.name}' in Hard Ground does not move as ground '{name}' does: parent it to what that is "
+                "parented to, or remove it from the list."
+            )
+    matrices = from_origin @ matrices
+    if not np.ptp(matrices, axis=0).any():
+        return None
     to_world = np.tile(np.eye(4), (len(frames), 1, 1))
     to_world[:, :3, :3] = axes
     to_world[:, :3, 3] = matrices[:, :3, 3] * scale
@@ -99,11 +106,15 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     return replace(frame, riding=_riding(scene, ground, place))
 
 
-def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: SceneUnits) -> jobs.Job[Array]:
-    name = obj.name_full
-    reading = record_props(scene, obj.name, frames, units, [name])
+def _paths(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], frames: range, units: SceneUnits
+) -> jobs.Job[list[Array]]:
+    """Where some objects are at each frame in the frame of the units, (F, 4, 4) each [Blender units]."""
+    names, name = [obj.name_full for obj in objects], objects[0].name
+    reading = record_props(scene, name, frames, units, list(dict.fromkeys(names)))
     recording = yield from jobs.counted(reading, "sample", len(frames))
-    return recording.props[name].copy()
+    metres = np.array([units.unit_scale_m] * 3 + [1.0])[:, None]
+    return [recording.props[name] / metres for name in names]
 
 
 def _riding(scene: bpy.types.Scene, ground: bpy.types.Object, place: Array) -> dict[str, Array]:

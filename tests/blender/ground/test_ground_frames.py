@@ -212,6 +212,27 @@ def test_steps_on_a_crate_that_rides_along_stand_on_it(short_walk):
         bake(short_walk)
 
 
+def test_a_crate_on_a_bone_that_moves_beside_the_deck_is_refused(short_walk):
+    ground = field(short_walk)
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(0, -0.8, 0))
+    crate = bpy.context.object
+    bpy.ops.object.armature_add()
+    crane = bpy.context.object
+    crate.parent = crane
+    for bone, hung in (("Bone", crate), ("Object", ground)):
+        hung.parent, hung.parent_type = crane, "BONE" if bone == "Bone" else "OBJECT"
+    crate.parent_bone = "Bone"
+    arm = crane.pose.bones["Bone"]
+    short_walk.softground.hard_grounds.add().object = crate
+    arm.keyframe_insert("location", frame=1)
+    bpy.context.view_layer.update()
+    bake(short_walk)
+    arm.location = (0.5, 0, 0)
+    arm.keyframe_insert("location", frame=30)
+    with pytest.raises(InputError, match="'Cube' in Hard Ground does not move as ground 'Field' does"):
+        bake(short_walk)
+
+
 def turning_over(time):
     return (0, 0, 0), (1.5 * time, 0, 0)
 
