@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 Direction = tuple[float, float, float]
 
 FAR = 1000.0
-"""What is farther from the world's origin has a frame of its own [m]: single precision rounds to 0.06 mm there."""
+"""Farthest from the origin that a shot is solved in the world's frame [m]: single precision rounds to 0.06 mm there."""
 UP = (0.0, 0.0, 1.0)
 LEANING = 0.25
-"""A body stands where the middle of its bones is so far above its origin, as a part of their distance."""
+"""Least height of the middle of a standing body's bones above its origin, over the distance between the two."""
 TINY = 1e-9
 
 

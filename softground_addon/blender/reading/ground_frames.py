@@ -22,11 +22,11 @@ from ..sampling.rig_recording import record_props
 from ..sampling.sampling_scene import object_named
 
 STIFF = 1e-4
-"""Ground keeps its shape where its axes change by less than this part of themselves."""
+"""Largest change of a rigid ground's axes, relative to their length."""
 STEEPEST = 60.0
-"""How far ground may tilt against what pulls on bodies there [degrees]: beyond, no height lies over each place."""
+"""Largest tilt of ground against the force on bodies there [degrees]: no height field holds on steeper ground."""
 MESH = 100.0
-"""Where there is no ground, its frame lies on a grid of this width, wherever in it the character is [m]."""
+"""Spacing of the places at which the frame lies for a ground that is still to be created [m]."""
 
 
 def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
@@ -55,7 +55,7 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
 
 
 def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFrame | None:
-    """The frame of the settings' ground, which something moves; None where that keeps it still."""
+    """The frame of a ground with a mover; None where the ground stays where it is all the same."""
     assert wanted.ground
     ground, scale = settings.found(wanted.ground), wanted.unit_scale_m
     name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)

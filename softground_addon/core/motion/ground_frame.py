@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
 ALIGNED = 1e-5
-"""Axes that differ by less are one [rad]: single precision knows them no better."""
+"""Largest angle between axes that count as parallel [rad]: single precision resolves no less."""
 
 
 @dataclass(frozen=True)
 class GroundFrame:
-    """A frame of its own for the ground, where the world's would not do.
+    """Frame in which a shot is solved on ground that moves, is far away, or has sideways gravity.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class GroundFrame:
     path : (F, 4, 4) float array or None
         World to this frame, at each scene frame, while a moving ground is read [Blender units].
     ride : GroundRide or None
-        What the motion of the ground asks of bodies on it, meanwhile.
+        Accelerations of a moving ground, while it is read.
     riding : mapping of str to (4, 4) float array
-        Objects that move along, by their full names: their own space to this frame [Blender units].
+        Objects that move with the ground, by full name: their own space to this frame [Blender units].
     """
 
     matrix: Rows

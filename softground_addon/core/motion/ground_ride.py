@@ -1,4 +1,4 @@
-"""How ground moves in the world, and what that asks of bodies that move on it."""
+"""Accelerations of moving ground, and the inertial forces on bodies that move on it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ CUTOFF = 4.0
 HIGHEST_CUTOFF = 0.34
 """The same as a fraction of the frame rate, at most."""
 FAR = 1000.0
-"""Places farther from the origin are told by parents, and not rounded as much as that [m]."""
+"""Farthest from the origin that places are rounded as single precision does [m]; beyond, parents keep them finer."""
 EVEN = 4.0
-"""Ground moves evenly where it is off a straight line by no more than this, in roundings of single precision."""
+"""Largest distance of even motion from a straight line [roundings of single precision]."""
 
 
 @dataclass(frozen=True)
 class GroundRide:
-    """The motion of ground, of which a body in its frame feels what is no even one.
+    """Terms of the inertial force on bodies in the frame of moving ground; even motion has none.
 
     Attributes
     ----------
@@ -63,7 +63,8 @@ class GroundRide:
         return cls(np.asarray(frames, dtype=np.float64), rest, turning, spinning)
 
     def upward(self, frames: Array, centre: Array, velocity: Array) -> Array:
-        """What carries bodies at places (N, 3) [m] of the frame with velocities (N, 3) [m/s], per weight, (N, 3)."""
+        """Force that holds bodies against gravity and inertia at places (N, 3) [m] of the frame with velocities (N, 3)
+        [m/s], per weight, (N, 3)."""
         rest, turning, spinning = (
             np.stack([np.interp(frames, self.frames, part) for part in values.reshape(len(values), -1).T], axis=-1)
             for values in (self.rest, self.turning, self.spinning)
