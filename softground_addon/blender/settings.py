@@ -288,7 +288,7 @@ def find(name: ObjectName) -> bpy.types.Object | None:
     return obj
 
 
-def found(name: ObjectName) -> bpy.types.Object:
+def resolve(name: ObjectName) -> bpy.types.Object:
     """The object of a name, whatever it is called by now.
 
     Raises

@@ -37,7 +37,7 @@ MOST_MISSED = 0.02
 def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> None:
     """Raise InputError if nobody moves, and keys hold nobody in a pose."""
     still = [finding for motion in motions if (finding := no_motion(motion))]
-    rigs = [settings.found(character.armature) for character in wanted.characters if character.armature]
+    rigs = [settings.resolve(character.armature) for character in wanted.characters if character.armature]
     if len(still) == len(motions) and not any(map(holds_a_pose, rigs)):
         raise InputError(" ".join(finding.text for finding in still))
 

@@ -167,7 +167,7 @@ def bake(
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
     """A shot, and what the user should know of what it was read from; InputError if nobody moves in what is written."""
-    moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
+    moving = bake_report.ground_findings(settings.resolve(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
     if write:
         check_motion(wanted, shot.motions)
@@ -199,7 +199,7 @@ def write_prints(
     sole_length : float
         Of the shortest sole [m].
     """
-    weather_before = weather.values_of(settings.found(wanted.ground)) if wanted.ground else {}
+    weather_before = weather.values_of(settings.resolve(wanted.ground)) if wanted.ground else {}
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(left.shaping, **at_the_end(wanted))
@@ -261,7 +261,7 @@ def _given(
         Progress("write", 0.1), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.1), coverage.slices(vertices, index, trail.printed, cell_size))
-    ground = settings.found(name)
+    ground = settings.resolve(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
     too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
     if not too_coarse and not wants_detail(ground, cover, detail, cell_size, sole_length):
@@ -272,12 +272,12 @@ def _given(
     refinement = yield from meanwhile(
         Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
-    drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
+    drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement)
     drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
         Progress("write", 0.15), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
-    ground, draft = settings.found(name), settings.found(drafted_name)
+    ground, draft = settings.resolve(name), settings.resolve(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

@@ -52,7 +52,7 @@ def hidden_skins(objects: settings.Objects, wanted: BakeSettings, motions: Seque
         average = {m.sole.name for m in motion.soles if m.sole.prop is None and m.sole.underside is None}
         if not average or not character.armature:
             continue
-        armature = settings.found(character.armature)
+        armature = settings.resolve(character.armature)
         bones = {
             bone for sole in character.soles if sole.name in average for bone in (sole.bone, sole.toe_bone) if bone
         }
@@ -83,7 +83,7 @@ def shapes_left_out(objects: settings.Objects, wanted: BakeSettings) -> list[Fin
                 f"The skin of '{body}' was read without {' and '.join(causes)}.",
                 "Check that its feet lie in their prints; if not, apply it or switch it off.",
             )
-            for body, causes in left_out_on(objects, settings.found(character.armature), bones).items()
+            for body, causes in left_out_on(objects, settings.resolve(character.armature), bones).items()
         ]
     return findings
 

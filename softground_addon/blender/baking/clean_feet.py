@@ -101,7 +101,7 @@ def _with_legs(character: CharacterSettings) -> CharacterSettings:
     """A character with the legs of feet that hang elsewhere or are the ends of shins, where no leg of it is mapped."""
     if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
         return character
-    armature, soles = settings.found(character.armature), [sole.bone for sole in character.soles if sole.bone]
+    armature, soles = settings.resolve(character.armature), [sole.bone for sole in character.soles if sole.bone]
     legs = legs_of_feet(armature, soles) or legs_on_shins(armature, soles)
     return replace(character, joints={**character.joints, **legs})
 

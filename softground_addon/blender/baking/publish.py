@@ -147,7 +147,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             unit_scale=made_with.unit_scale_m,
             frame=made_with.frame,
             shape_keys=made_with.shape_keys
-            and (made_with.dense_shape_keys or not display_key.is_dense(settings.found(place.display_mesh))),
+            and (made_with.dense_shape_keys or not display_key.is_dense(settings.resolve(place.display_mesh))),
             marks=marks,
             water=water_at(relief, len(x)),
             layer=partial(under_layer.layers, made_with=made_with),
@@ -168,7 +168,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             yield Progress("write", 0.95)
         trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
-    ground = settings.found(made_with.ground) if made_with.ground else shown
+    ground = settings.resolve(made_with.ground) if made_with.ground else shown
     of_steps = {step.index: step.left.surface for step in left.steps if step.left and step.left.surface}
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
@@ -177,7 +177,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
 
 def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:
     """What soles trample, where plants give way to it."""
-    if made_with.ground is None or trampling_table.of(settings.found(made_with.ground)) is None:
+    if made_with.ground is None or trampling_table.of(settings.resolve(made_with.ground)) is None:
         return None
     return (yield from meanwhile(Progress("write", 0.95), tramplings.slices(footprints)))
 

@@ -179,7 +179,7 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
 def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
     """Bodies without an armature, whose contacts are parts of a shape that changes."""
     for character in wanted.characters:
-        if character.body and any(map(deforms, meshes_of(settings.found(character.body)))):
+        if character.body and any(map(deforms, meshes_of(settings.resolve(character.body)))):
             yield Finding(
                 "followed_shape",
                 "note",

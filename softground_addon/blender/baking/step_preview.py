@@ -83,7 +83,7 @@ class StepPreview:
         return inside
 
     def _write(self, positions: NDArray[np.float32]) -> None:
-        mesh = ground_mesh.mesh_of(settings.found(self._name))
+        mesh = ground_mesh.mesh_of(settings.resolve(self._name))
         keys = mesh.shape_keys
         shown = keys.key_blocks.get(display_key.DISPLAY_KEY) if keys else None
         if shown is not None:
@@ -94,7 +94,7 @@ class StepPreview:
 
     def _show_playback(self, shown: bool) -> None:
         for name in self._hidden:
-            settings.found(self._name).modifiers[name].show_viewport = shown
+            settings.resolve(self._name).modifiers[name].show_viewport = shown
 
 
 def _windows(

@@ -21,7 +21,7 @@ from ..drafts import none_left_if_it_fails
 from ..materials.materials import EDGE, drafted, ensure_material
 from ..mesh_arrays import add_faces
 from ..placement import to_world
-from ..settings import find, found, name_of
+from ..settings import find, name_of, resolve
 from .ground_mesh import discard, mesh_of, write_positions
 
 Array = NDArray[np.float64]
@@ -170,17 +170,17 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
     drafts.callback(_discard_unpublished, name)
     del edges
     yield
-    mesh = mesh_of(found(name))
+    mesh = mesh_of(resolve(name))
     mesh.update()
     mesh.shade_smooth()
     yield
     uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
-    layer = mesh_of(found(name)).uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
+    layer = mesh_of(resolve(name)).uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
     layer.uv.foreach_set("vector", (uv / uv.max())[corner_vertex].ravel())
     yield
     if edge > 0:
         inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
-        fading: Any = mesh_of(found(name)).attributes.new(EDGE, "FLOAT", "POINT")
+        fading: Any = mesh_of(resolve(name)).attributes.new(EDGE, "FLOAT", "POINT")
         fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
     return name
 

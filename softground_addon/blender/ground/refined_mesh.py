@@ -18,7 +18,7 @@ from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import own_data
-from ..settings import found
+from ..settings import resolve
 
 LAYOUT = {
     "FLOAT": ("value", 1, np.float32),
@@ -177,7 +177,7 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
 
 
 def _mesh_of(name: ObjectName) -> bpy.types.Mesh:
-    return cast("bpy.types.Mesh", found(name).data)
+    return cast("bpy.types.Mesh", resolve(name).data)
 
 
 def _copy_vertex_groups(mesh: bpy.types.Mesh, carried: Carried, surface: Surface, refinement: Refinement) -> None:

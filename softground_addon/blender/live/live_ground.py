@@ -81,7 +81,7 @@ class LiveGround:
     """
 
     def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> None:
-        ground = settings.found(place.display_mesh)
+        ground = settings.resolve(place.display_mesh)
         self._name = place.display_mesh
         self._vertices, self._place = place.index, place.position[:, :2]
         self._up = ground_surface.up_of(ground, unit_scale, frame)
@@ -93,7 +93,7 @@ class LiveGround:
     def put_on(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> bpy.types.Object:
         """Show a place that has no prints yet; returns the ground."""
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
-        empty, ground = np.empty(0, np.intp), settings.found(place.display_mesh)
+        empty, ground = np.empty(0, np.intp), settings.resolve(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
         up = ground_surface.up_of(ground, unit_scale, frame)
         ground_mesh.write(ground, empty, nothing, no_prints, up, shape_keys=False)

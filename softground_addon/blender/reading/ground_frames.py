@@ -40,8 +40,8 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
     ground, bodies = np.eye(4), list(_bodies(wanted))
     direction = felt_gravity(wanted.gravity_direction, bodies)
     if wanted.ground:
-        ground = world_matrix(settings.found(wanted.ground))
-        if mover_of(settings.found(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
+        ground = world_matrix(settings.resolve(wanted.ground))
+        if mover_of(settings.resolve(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
             return replace(wanted, frame=frame)
     elif bodies:
         place = world_matrix(bodies[0])[:3, 3] * wanted.unit_scale_m
@@ -57,7 +57,7 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
 def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFrame | None:
     """The frame of the settings' ground, which something moves; None where that keeps it still."""
     assert wanted.ground
-    ground, scale = settings.found(wanted.ground), wanted.unit_scale_m
+    ground, scale = settings.resolve(wanted.ground), wanted.unit_scale_m
     name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
@@ -116,5 +116,5 @@ def _riding(scene: bpy.types.Scene, ground: bpy.types.Object, place: Array) -> d
 def _bodies(wanted: BakeSettings) -> Iterator[bpy.types.Object]:
     for character in wanted.characters:
         if owner := character.armature or character.body:
-            yield settings.found(owner)
+            yield settings.resolve(owner)
         yield from (object_named(sole.object) for sole in character.soles if sole.object)

@@ -69,7 +69,7 @@ def _tops(
     """The upper sides of objects within bounds in the plane, of those that have any."""
     tops = []
     for name in names:
-        surface = ground_surface.undisturbed_surface(settings.found(name), wanted.unit_scale_m, frame=wanted.frame)
+        surface = ground_surface.undisturbed_surface(settings.resolve(name), wanted.unit_scale_m, frame=wanted.frame)
         yield
         with suppress(InputError):  # nobody walks there
             tops.append((name, (yield from ground_surface.terrain_of.slices(surface, bounds))))
@@ -80,8 +80,8 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     """The meshes that a scene shows where soles rest, and that do not move."""
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
-    ground = settings.found(wanted.ground) if wanted.ground else None
-    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
+    known = {settings.resolve(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
     known |= {ground, display_mesh_of(ground)} if ground else set()
     still = []
     for obj in scene.objects:

@@ -128,10 +128,10 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
             "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
             "Character."
         )
-    ground = settings.found(wanted.ground) if wanted.ground else None
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
     for printing in wanted.characters:
         if printing.armature:
-            require_armature(settings.found(printing.armature))
+            require_armature(settings.resolve(printing.armature))
         check_props(scene.objects, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
@@ -145,7 +145,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 "the same one."
             )
     for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.found(name), ground):
+        if fault := ground_checks.hard_fault(settings.resolve(name), ground):
             raise InputError(fault)
     return ground_frames.framed(scene, wanted)
 
@@ -166,7 +166,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
         terrain, missing = yield from _with_hard(scene, wanted, motions, plan.terrain, np.stack([lower, upper]))
         return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
     yield Progress("sample", 1.0)
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
     of_slots = wanted.kinds[1]
     looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
@@ -240,7 +240,7 @@ def sample_characters(
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
         job: Generator[int | None, None, CharacterMotion]
         if character.armature:
-            armature = settings.found(character.armature)
+            armature = settings.resolve(character.armature)
             if wanted.response:
                 check_rig(scene.objects, armature, mapping, character.mass_kg)
                 controls = controls_of(scene.view_layers[0], armature, mapping)

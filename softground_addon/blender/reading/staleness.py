@@ -98,7 +98,7 @@ def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: 
     deletion = _deletion_of(ground)
     if deletion or wanted.ground is None:
         return deletion
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
@@ -155,14 +155,14 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
 def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and the
     hard objects that bear them."""
-    ground = settings.found(wanted.ground) if wanted.ground else None
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
     movers = [obj for character in wanted.characters for obj in movers_of(character)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{character.name}": _of_body(objects, character) for character in wanted.characters},
-        **{f"{HARD}:{name.name}": _of_hard(settings.found(name)) for name in wanted.hard_grounds},
+        **{f"{HARD}:{name.name}": _of_hard(settings.resolve(name)) for name in wanted.hard_grounds},
     }
 
 
@@ -189,7 +189,7 @@ def of_ground(wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the ground of a shot is read from, the same with and without a bake on it; none without ground."""
     if wanted.ground is None:
         return {}
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     return {GROUND: _of_ground(ground), SURFACE: _of_surface(ground, wanted.painted)}
 
 
@@ -289,7 +289,7 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
 def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
     """The armature, or the body with its meshes, and the objects of a character."""
     owner = character.armature or character.body
-    owners = [settings.found(owner)] if owner else []
+    owners = [settings.resolve(owner)] if owner else []
     parts = [part for part in _worn_by_body(character) if part not in owners]
     return [*owners, *parts, *_things_of(character)]
 
@@ -300,11 +300,11 @@ def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
 
 
 def _worn_by(objects: settings.Objects, character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_on(objects, settings.found(character.armature)) if character.armature else _worn_by_body(character)
+    return meshes_on(objects, settings.resolve(character.armature)) if character.armature else _worn_by_body(character)
 
 
 def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_of(settings.found(character.body)) if character.body else []
+    return meshes_of(settings.resolve(character.body)) if character.body else []
 
 
 def bodies_of(objects: settings.Objects, wanted: BakeSettings) -> list[bpy.types.Object]:
@@ -325,7 +325,7 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
         for worn in _worn_by(objects, character)
     ]
     if character.armature:
-        rigs = worn_rigs(objects, settings.found(character.armature))
+        rigs = worn_rigs(objects, settings.resolve(character.armature))
         parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 

@@ -69,7 +69,7 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     _check_names(baked_ground.display_mesh_of(ground))
     footprints, about = (left.shaping, left.about) if left else baked_ground.load(ground)
     places = yield from _places(ground, footprints, about)
-    ground = settings.found(name)
+    ground = settings.resolve(name)
     display_mesh = baked_ground.display_mesh_of(ground)
     existing: Any = weather_modifier.modifier_of(display_mesh)
     if existing:
@@ -198,7 +198,7 @@ def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mappin
     name, frame = settings.name_of(display_mesh), baked_ground.frame_in(about["inputs"])
     position = ground_surface.undisturbed_surface(display_mesh, unit_scale, frame=frame).vertices
     yield READING
-    display_mesh = settings.found(name)
+    display_mesh = settings.resolve(name)
     mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale, frame)
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
     relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)
