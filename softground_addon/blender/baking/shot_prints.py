@@ -39,7 +39,7 @@ class ShotPrints:
 
     Attributes
     ----------
-    left : BakeRecord
+    record : BakeRecord
         Prints that soles press, as they are and as they are edited, and what bodies carve.
     debris : Debris or None
         What steps throw.
@@ -53,7 +53,7 @@ class ShotPrints:
         Offsets, forces and gaps, for the report.
     """
 
-    left: BakeRecord
+    record: BakeRecord
     debris: Debris | None
     marks: Marks | None
     responses: list[CharacterResponse]
@@ -90,24 +90,24 @@ def _pressed(
     pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
-    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
-    left = yield from meanwhile(at_end, carving)
-    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
-    left, debris = yield from meanwhile(at_end, throwing)
-    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
+    carving = with_carves.slices(pressed.record, responses, shot.skins, ground, wanted.surface)
+    record = yield from meanwhile(at_end, carving)
+    throwing = with_debris.slices(record, ground, wanted, pressed.loads)
+    record, debris = yield from meanwhile(at_end, throwing)
+    marking = marks_left.slices(record, shot.terrain, wanted, pressed.loads, debris)
     marks = yield from meanwhile(at_end, marking)
-    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, left.edited)
+    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, record.edited)
     gaps = yield from meanwhile(at_end, measuring)
     name = wanted.ground.name if wanted.ground else "the ground"
-    checking = self_check.slices(pressed.loads, left.footprints, shot.terrain, wanted.cell_size_m, name)
+    checking = self_check.slices(pressed.loads, record.footprints, shot.terrain, wanted.cell_size_m, name)
     findings = yield from meanwhile(at_end, checking)
-    happening = events.slices(pressed.loads, left.footprints, surface=wanted.surface, first_frame=wanted.frames[0])
+    happening = events.slices(pressed.loads, record.footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     return ShotPrints(
-        left,
+        record,
         debris,
         marks,
         pressed.responses,
-        (*findings, *_bottomed_out(wanted, left.footprints, name)),
+        (*findings, *_bottomed_out(wanted, record.footprints, name)),
         (yield from meanwhile(at_end, happening)),
         {"offsets_mm": offsets_mm(pressed.loads), "forces": pressed.forces, "gaps_mm": gaps},
     )

@@ -9,13 +9,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...batch.manifest_values import FRAME_LIMIT
 from ...core.errors import InputError
 from ...core.events.events import Event, as_edited
 from ...core.ground.material import MATERIAL_RANGES, OFF
 from ...core.motion.ground_frame import GroundFrame, in_world, rows
+from ...core.numerics.arrays import Array, Indices
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
@@ -30,10 +30,6 @@ from ..plants import trampling_table
 from ..playback import own_data, playback
 from ..settings import SceneUnits, exists, name_of, resolve
 from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
 
 LARGEST_UNIT = 1e12
 """Of any of these, and 1 over the smallest: what is beyond is damage."""
@@ -268,8 +264,8 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    left = record_of(ground)
-    return left.shaping, dict(left.about)
+    bake_record = record_of(ground)
+    return bake_record.shaping, dict(bake_record.about)
 
 
 def events_of(ground: bpy.types.Object) -> list[Event]:
@@ -280,11 +276,11 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     InputError
         If there is no bake, or its record has no events.
     """
-    left = record_of(ground)
-    table = left.about.get(EVENTS)
+    bake_record = record_of(ground)
+    table = bake_record.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    inputs, rows_as_edited = left.about["inputs"], as_edited(table, left.steps, left.laid_carves)
+    inputs, rows_as_edited = bake_record.about["inputs"], as_edited(table, bake_record.steps, bake_record.laid_carves)
     return events_in_world(rows_as_edited, frame_in(inputs), ground, inputs["unit_scale_m"])
 
 
@@ -307,7 +303,7 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    return [step for step in record_of(ground).steps if step.left]
+    return [step for step in record_of(ground).steps if step.footprint]
 
 
 def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str, StepEdit]:

@@ -15,6 +15,7 @@ from ...core.ground.material import GroundMaterial
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
@@ -23,8 +24,6 @@ from ..mesh_arrays import add_faces
 from ..placement import to_world
 from ..settings import find, name_of, resolve
 from .ground_mesh import discard, mesh_of, write_positions
-
-Array = NDArray[np.float64]
 
 MAX_GRID_VERTICES = 4_000_000
 """Most vertices that a created grid gets; a longer walk gets a coarser mesh (the physics keeps its cells)."""

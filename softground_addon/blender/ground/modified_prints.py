@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array, Indices
 from .. import mesh_arrays
 from ..playback import playback
 from . import ground_mesh, ground_surface
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LIFT = 0.01
 """How far vertices are raised to see what modifiers make of it [m]."""

@@ -16,6 +16,7 @@ from ...core.ground.heightfield import HeightField
 from ...core.ground.sparse_grid import TILE, Window
 from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics import bilinear
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices
 from ...core.record import record
 from ...core.record.footprints import NEVER
@@ -24,8 +25,6 @@ from .. import settings
 from ..ground import ground_mesh, ground_surface
 from ..ground.baked_ground import Place
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Tile = tuple[int, int]
 
 ON_CENTRE = 1e-4

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
+from ...core.numerics.arrays import Array, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
 from ...core.settings import TIME_LIMIT, BakeSettings
 from .. import settings
@@ -25,9 +25,6 @@ from ..reading import analysis
 from ..reading.shots import Shot, ground_of, settings_of
 from .live_ground import LiveGround
 from .live_mode import LiveMode
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
 

@@ -7,7 +7,6 @@ from contextlib import suppress
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.findings import Finding, listed
@@ -16,6 +15,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.raised_rests import RaisedRest, carried_by, raised_rests, reach_of
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from .. import settings
@@ -23,8 +23,6 @@ from ..ground import ground_checks, ground_surface
 from ..ground.baked_ground import display_mesh_of
 from ..placement import matrix_in
 from . import staleness
-
-Array = NDArray[np.float64]
 
 
 @sliced

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.carving.responded_skin import WornSkin
 from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
@@ -26,6 +25,7 @@ from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.rig.mapping import RigMapping
 from ...core.settings import TIME_LIMIT, BakeSettings
 from ...core.weather.felt_weather import weathering_of
@@ -45,8 +45,6 @@ from ..sampling.rig_checks import check_rig
 from ..sampling.rig_sampling import sample_character, sample_prop
 from ..weather import ground_weather as weather
 from . import ground_frames, hard_ground
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

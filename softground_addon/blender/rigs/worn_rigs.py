@@ -7,13 +7,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
 
-Array = NDArray[np.float64]
 Lead = tuple[bpy.types.Object, str]
 """An armature and a bone of it that others follow."""
 

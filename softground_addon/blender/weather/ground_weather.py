@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
@@ -26,8 +27,6 @@ from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
 from . import weather_keys
-
-Array = NDArray[np.float64]
 
 READING = jobs.Progress("sample", 0.5)
 
@@ -45,18 +44,18 @@ PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
 of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
-def add(ground: bpy.types.Object, left: BakeRecord | None = None) -> Any:
+def add(ground: bpy.types.Object, record: BakeRecord | None = None) -> Any:
     """Put weather on a ground with a bake, or renew what there is, at once; the modifier. See `adding`."""
-    return jobs.run(adding(ground, left))
+    return jobs.run(adding(ground, record))
 
 
-def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str = "") -> jobs.Job[Any]:
+def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: str = "") -> jobs.Job[Any]:
     """Put weather on a ground with a bake, or renew what there is, in the last step; the modifier.
 
     Parameters
     ----------
-    left : BakeRecord, optional
-        What its bake left, where that need not be read.
+    record : BakeRecord, optional
+        Record of the bake, if it is at hand; otherwise read from the ground.
     preset : str, optional
         One of `PRESETS` to set it to.
 
@@ -67,7 +66,7 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     """
     name = settings.name_of(ground)
     _check_names(baked_ground.display_mesh_of(ground))
-    footprints, about = (left.shaping, left.about) if left else baked_ground.load(ground)
+    footprints, about = (record.shaping, record.about) if record else baked_ground.load(ground)
     places = yield from _places(ground, footprints, about)
     ground = settings.resolve(name)
     display_mesh = baked_ground.display_mesh_of(ground)
@@ -93,12 +92,12 @@ def values_of(ground: bpy.types.Object) -> dict[str, float]:
     return {} if modifier is None else weather_keys.values_of(modifier)
 
 
-def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
-    """Fit weather to what a new bake left, with the values that the ground had before it; nothing if it had none."""
+def renew(ground: bpy.types.Object, values: Mapping[str, float], record: BakeRecord) -> None:
+    """Fit weather to the record of a new bake, with the values that the ground had before it, if it had weather."""
     existing = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
     if existing is None and not values:
         return
-    modifier = add(ground, left)
+    modifier = add(ground, record)
     if existing is None:
         _set(modifier, values)
 

@@ -12,11 +12,10 @@ from ..events.phases import Phase
 from ..ground import surfaces
 from ..ground.surfaces import ThrownMatter
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.throws import Throw, ThrowKind
-
-Array = NDArray[np.float64]
 
 PUSHING = 0.25
 """Time before a sole leaves in which it pushes off [s]."""

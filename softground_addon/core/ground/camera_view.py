@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..numerics.arrays import Array, Mask
+
 Place = tuple[float, float, float]
 
 PIXELS = 0.75

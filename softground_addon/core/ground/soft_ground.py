@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .heightfield import HeightField, Terrain
 from .material import STANDARD_GRAVITY, GroundMaterial, Pressure
 from .regions import Regions
 from .sparse_grid import SparseGrid, Window
 from .variation import Variation
-
-Array = NDArray[np.float64]
 
 
 class Weathering(Protocol):
