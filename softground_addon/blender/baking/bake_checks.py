@@ -1,4 +1,4 @@
-"""What a bake must fulfil before anything is written."""
+"""Checks of a bake before anything is written."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_si
 
 
 def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[Finding]:
-    """What the user should know about prints that leave the fine part of a ground."""
+    """Findings about prints beyond the fine part of a ground."""
     if not (cover.is_fine_somewhere and cover.is_coarse(cell_size)):
         return []
     if detail == "NEVER":
@@ -133,7 +133,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
 
 
 def copy_findings(ground: bpy.types.Object) -> list[Finding]:
-    """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
+    """Findings about a finer copy of a ground: it holds what modifiers show in the viewport."""
     # Nodes may scatter objects for renders only, and those stay.
     hidden = (modifier for modifier in ground.modifiers if modifier.show_render and not modifier.show_viewport)
     names = [

@@ -51,7 +51,7 @@ from .shot_prints import shot_prints
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake leaves behind, apart from the ground itself.
+    """Result of a bake, apart from the ground itself.
 
     Attributes
     ----------

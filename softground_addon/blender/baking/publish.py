@@ -1,4 +1,4 @@
-"""From a record and a place to the ground that plays it: the only code that does this, whatever the record is from."""
+"""Publishing of a record on a ground, which then plays it; every record passes through here."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
 
 
 def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:
-    """What soles trample, where plants give way to it."""
+    """Trampling by the soles; None if no plants give way."""
     if made_with.ground is None or trampling_table.of(settings.resolve(made_with.ground)) is None:
         return None
     return (yield from meanwhile(Progress("write", 0.95), tramplings.slices(footprints)))

@@ -1,4 +1,4 @@
-"""What is not at work in a scene though its user may think so, or works otherwise in a bake: each with its remedy."""
+"""Findings about animation that does not act in a scene, or acts otherwise in a bake; each with its remedy."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NO_MOTION = ("hide", "show_", "color", "display", "layers", "is_visible")
 
 
 def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> list[Finding]:
-    """What the user should know of a scene whose shot was just read."""
+    """Findings about a scene whose shot was just read."""
     movers = [mover for character in wanted.characters for mover in staleness.movers_of(character)]
     followed = list(dict.fromkeys(node for mover in movers for node in (mover, *all_leaders(mover))))
     first, last = (frame * wanted.time_stretch for frame in wanted.frames)

@@ -1,4 +1,4 @@
-"""What a shot leaves: pressed from the settings and from what was read, or as the last bake has it from the same."""
+"""Prints of a shot: pressed, or taken from the last bake of the same inputs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
 
 @dataclass(frozen=True)
 class ShotPrints:
-    """What a shot leaves.
+    """Prints of a shot, and what else a bake writes of it.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class ShotPrints:
 
 
 def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
-    """What a shot leaves; errors as of `loads_standing` and `press_shot`."""
+    """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
     if not isinstance(ground.terrain, MeshTerrain):  # what is made or hard is not compared
@@ -114,7 +114,7 @@ def _pressed(
 
 
 def _bottomed_out(wanted: BakeSettings, footprints: Sequence[Footprint], ground: str) -> list[Finding]:
-    """What to say of steps that end at the bottom of the deepest layer of their surface."""
+    """Findings about steps that end at the bottom of the deepest layer of their surface."""
     by_depth = sorted(wanted.kinds[0], key=lambda kind: kind.material.deepest)
     findings = []
     for surface, material in {kind.surface: kind.material for kind in by_depth}.items():

@@ -99,6 +99,6 @@ class StepPreview:
 def _windows(
     unedited: Mapping[int, Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
 ) -> list[Window]:
-    """Where the prints of two sets of edits differ."""
+    """Windows in which the prints of two sets of edits differ."""
     pairs = ([prints.get(n, unedited.get(n)) for prints in (before, after)] for n in sorted({*before, *after}))
     return [side.window for pair in pairs if pair[0] is not pair[1] for side in pair if side]

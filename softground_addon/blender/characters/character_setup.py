@@ -41,7 +41,7 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
 
 
 def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> jobs.Job[SoftGroundCharacter]:
-    """What `add_character` does, in steps; nothing is changed before the last.
+    """Job of `add_character`; nothing is changed before the last.
 
     Where no feet are found its list of soles is empty, for the user to fill.
     """
@@ -242,7 +242,7 @@ def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping
 
 
 def title_of(character: SoftGroundCharacter) -> str:
-    """What the user calls a character: its armature's name, or that of the prop."""
+    """Name of a character in the interface: its armature's name, or that of the prop."""
     return character.armature.name if character.armature else character.name
 
 

@@ -1,4 +1,4 @@
-"""What a character prints with: from its skin where it has one, else from the names and the rest pose of its bones."""
+"""Recognition of what a character prints with: from its skin, or from the names and rest pose of its bones."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ EVENTS = "events"
 
 @dataclass(frozen=True)
 class Place:
-    """Where a bake is to be written. Nothing that the user sees is changed before `publish`.
+    """Place to write a bake to. Nothing that the user sees is changed before `publish`.
 
     Attributes
     ----------
@@ -307,7 +307,7 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
 
 
 def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str, StepEdit]:
-    """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read.
+    """The artist's edits of the steps of a ground's bake, by step id; none if no bake can be read.
 
     `names` are those that its characters have now, if the ids are to have these.
     """

@@ -38,7 +38,7 @@ BLUR_REACH = 3.0
 
 @dataclass(frozen=True)
 class Layout:
-    """A ground before there is a mesh of it.
+    """Plan of a created ground, before its mesh is made.
 
     Attributes
     ----------
@@ -84,13 +84,13 @@ def soft_edge(margin: float) -> float:
 
 
 def reach_of(material: GroundMaterial) -> float:
-    """How far beyond the soles a material moves the ground [m]."""
+    """Distance beyond the soles to which a material moves the ground [m]."""
     return material.rim_reach + BLUR_REACH * material.blur_sigma
 
 
 @dataclass(frozen=True)
 class CloseUp:
-    """Where a ground is finer than its cells.
+    """Part of a ground whose mesh is finer than its cells.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class CloseUp:
 
 
 def _close_up(wanted: BakeSettings, plan: GroundPlan) -> CloseUp | None:
-    """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
+    """Part of a created ground that is finer than its cells, to show relief close up."""
     if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
         return None
     near = np.ones(len(plan.footfalls), bool)

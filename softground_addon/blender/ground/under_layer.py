@@ -1,4 +1,4 @@
-"""Where prints show what lies below the layer that they are in: how deep that is at each vertex."""
+"""Depth of the layer at each vertex, for prints that show the ground below it."""
 
 from __future__ import annotations
 

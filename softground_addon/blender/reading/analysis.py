@@ -1,4 +1,4 @@
-"""What is known of a shot before it is baked: its loads on the ground and the depth to expect.
+"""Analysis of a shot before it is baked: its loads on the ground and the predicted depth.
 
 A shot is read when the user asks for something that needs it, and kept while Blender runs, outside the file. It counts
 as known until what it was read from changes; what the add-on itself writes leaves it known.
@@ -138,7 +138,7 @@ def read(scene: bpy.types.Scene) -> Analysis:
 
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
-    """What `read` does, in steps."""
+    """Job of `read`."""
     analysis = yield from refreshing(scene)
     if analysis is None:
         wanted = settings_of(scene)
@@ -248,8 +248,8 @@ def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
-    """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers;
-    nothing of one that moves, which is told by hash."""
+    """World matrix of the ground, without evaluating the scene, which would call the handlers; empty for a ground that
+    moves, which is compared by hash."""
     if mover_of(ground):
         return []
     return [tuple(row) for row in ground_surface.placed_by_parents(ground) or ground.matrix_world]

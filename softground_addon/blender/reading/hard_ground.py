@@ -96,7 +96,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
 
 
 def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:
-    """What to say of an object that carries soles and is not in the settings."""
+    """Finding about an object that carries soles and is not in the settings."""
     who, first = listed(dict.fromkeys(rest.character for rest in rests)), min(rest.frame for rest in rests)
     count = f"{len(rests)} steps of {who} stand" if len(rests) > 1 else f"1 step of {who} stands"
     return Finding(

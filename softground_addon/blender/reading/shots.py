@@ -149,7 +149,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
 
 
 def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
-    """What the scene's characters do below a layer, and the ground that they do it on.
+    """Motions of the scene's characters below a response layer, and their ground.
 
     Raises
     ------

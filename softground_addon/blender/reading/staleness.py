@@ -1,4 +1,4 @@
-"""Whether a bake still fits what it was made from: the settings, the ground's mesh, the animation. By hash."""
+"""Comparison of a bake with its inputs, by hash: the settings, the ground's mesh, the animation."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], so
 
 
 def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: BakeSettings) -> tuple[str, ...]:
-    """What has changed since the bake on a ground, for the user to read; nothing where there is none.
+    """Changes since the bake on a ground, as texts for the user; none without a bake.
 
     Parameters
     ----------

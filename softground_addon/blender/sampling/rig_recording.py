@@ -33,7 +33,7 @@ def record(
     below: LayerKind = LayerKind.RESPONSE,
     findings: list[Finding] | None = None,
 ) -> Generator[int, None, Recording]:
-    """Where some bones of a rig and some objects are over time, and what values some shape keys of objects have.
+    """Transforms over time of bones and objects, and values of shape keys.
 
     Yields the number of frames read.
 
@@ -59,7 +59,7 @@ def record_props(
     *,
     findings: list[Finding] | None = None,
 ) -> Generator[int, None, Recording]:
-    """Where some objects are over time; `name` is what the user calls them together.
+    """Transforms of objects over time; `name` is their common name in errors.
 
     Yields the number of frames read.
 

@@ -1,4 +1,4 @@
-"""What a rig does over a range of frames, as a `CharacterMotion`; the user's scene is only read.
+"""Sampling of a rig over a range of frames into a `CharacterMotion`; the user's scene is only read.
 
 A rig that nothing but its keys moves is not evaluated at all. Others are, in a temporary scene that depends on nothing
 else: constraints, drivers, NLA, parents and object motion act as in the user's scene, its meshes cost nothing, and the

@@ -87,7 +87,7 @@ def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: s
 
 
 def values_of(ground: bpy.types.Object) -> dict[str, float]:
-    """What the sliders of a ground's weather are at; nothing where there is none."""
+    """Slider values of a ground's weather; empty if it has none."""
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
     return {} if modifier is None else weather_keys.values_of(modifier)
 

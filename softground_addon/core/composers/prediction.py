@@ -172,7 +172,7 @@ def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotCon
 
 
 def _middle(ordered: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """As many of the ordered numbers from their middle, or one more."""
+    """The middle `count` of the ordered numbers, or one more."""
     beside = max(0, (len(ordered) - count) // 2)
     return ordered[beside : len(ordered) - beside]
 

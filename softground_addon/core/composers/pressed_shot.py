@@ -31,7 +31,7 @@ from .simulation import simulate
 
 @dataclass(frozen=True)
 class PressedShot:
-    """What a shot leaves.
+    """Loads, record and responses of a shot.
 
     Attributes
     ----------

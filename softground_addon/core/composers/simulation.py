@@ -1,4 +1,4 @@
-"""From a character's motion to its loads, and from loads to footprints in the ground."""
+"""Simulation of loads from a character's motion, and of footprints from loads."""
 
 from __future__ import annotations
 

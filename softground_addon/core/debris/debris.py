@@ -95,7 +95,7 @@ class Debris:
 
 @dataclass(frozen=True)
 class Source:
-    """What throws at a step as the artist left it, and how much [m³]."""
+    """Source of debris at a step after the artist's edits, with its volume [m³]."""
 
     throw: Throw
     step: EditableStep

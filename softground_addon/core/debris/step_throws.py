@@ -40,12 +40,12 @@ LANDING_TIME = 0.1
 
 @sliced
 def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], *, surface: str) -> Slices[list[Throw]]:
-    """How the steps of a bake throw.
+    """Throws of the steps of a bake.
 
     Parameters
     ----------
     footprints : sequence of Footprint
-        That they left.
+        Prints of the loads.
     """
     throws: list[Throw] = []
     for character in loads:

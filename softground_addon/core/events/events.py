@@ -217,7 +217,7 @@ def _moved(row: Event, step: EditableStep) -> Event:
 
 
 def _wade(row: Event, step: EditableStep, carve: Footprint) -> Event:
-    """What a leg cuts out of deep ground beside its print, by an event of the step."""
+    """Event of a leg that carves deep ground beside its print, from the event of the step."""
     changes, cell = carve.compression, carve.cell_size
     cut = np.maximum(np.add.reduceat(changes.amounts.astype(float), changes.first[:-1]), 0.0).cumsum()
     start, end = changes.frames[np.searchsorted(cut, np.array(MOST_OF_A_CUT) * cut[-1])]

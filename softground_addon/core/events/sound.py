@@ -204,7 +204,7 @@ def step_sound(step: SoundStep) -> tuple[int, Array]:
 
 
 def voice_of(surface: str) -> Voice:
-    """How a surface sounds, or a hard floor."""
+    """Voice of a surface, or of a hard floor."""
     return surfaces.HARD_VOICE if surface == surfaces.HARD else surfaces.find(surface).voice
 
 

@@ -1,4 +1,4 @@
-"""What the scene's camera sees of a ground: how far the picture reaches, and where it comes close."""
+"""The scene's camera above a ground: how far the picture reaches, and where it comes close."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class CameraView:
         )
 
     def reach(self, height: float) -> Array:
-        """Where the corners of the picture lie on level ground, (N, 2) [m]; far away for those above the horizon.
+        """Corners of the picture on level ground, (N, 2) [m]; far away for those above the horizon.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""What grounds are made of: one record for each surface, with all that follows from what it is made of.
+"""Surfaces of grounds: one record for each, with all of its properties.
 
 A new look is a record here, a function of `blender.materials.surface_shaders` and a preset with its picture.
 
@@ -134,7 +134,7 @@ class Soaking:
 
 @dataclass(frozen=True)
 class CarriedFilm:
-    """What stays on a sole that leaves the ground, and comes off on hard floors.
+    """Film that stays on a sole and comes off on hard floors.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class CarriedFilm:
     most, taken : float
         Mass per area of the sole at most, and that a clean one takes up in one step [kg/m²].
     deposited : float
-        Share of it that a sole which presses hard leaves on a floor.
+        Share of it that a sole deposits on a floor under high pressure.
     water : float
         Share of the mass that dries.
     """
@@ -161,7 +161,7 @@ CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
 
 @dataclass(frozen=True)
 class Liquid:
-    """What wets hard floors; its fields are those of `SurfaceRecord`."""
+    """Liquid on hard floors; its fields are those of `SurfaceRecord`."""
 
     name: str
     density: float
@@ -177,7 +177,7 @@ class Liquid:
 
 @dataclass(frozen=True)
 class SurfaceRecord:
-    """What a ground is made of.
+    """Properties of a surface.
 
     Attributes
     ----------

@@ -144,7 +144,7 @@ class EditableStep:
     baked : Footprint
         As it was baked; of a copy, its original.
     footprint : Footprint or None
-        As it lies on the ground, without the thrown volume; None if nothing of it does.
+        After the edits, without the thrown volume; None if it leaves no print.
     thrown : mapping of str to float
         Thrown volumes by phase [m³].
     """

@@ -97,7 +97,7 @@ class Recording:
         )
 
     def in_frame(self) -> Recording:
-        """What was read in the world, as seen in the frame that it is solved in."""
+        """The recording in the frame that it is solved in, rather than in the world's."""
         if self.units.frame is None:
             return self
         turn = self.units.frame.from_world(self.frames)
