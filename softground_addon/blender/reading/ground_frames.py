@@ -96,7 +96,7 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     path = np.linalg.inv(in_units)
     place = path[0] @ matrices[0]
     frame = GroundFrame(rows(place), True, float(frames[0]), path, ride())
-    return replace(frame, riding=_riding(scene, ground, place))
+    return replace(frame, riding=_riding(scene.objects, ground, place))
 
 
 def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: SceneUnits) -> jobs.Job[Array]:
@@ -106,10 +106,10 @@ def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: S
     return recording.props[name].copy()
 
 
-def _riding(scene: bpy.types.Scene, ground: bpy.types.Object, place: Array) -> dict[str, Array]:
+def _riding(objects: settings.Objects, ground: bpy.types.Object, place: Array) -> dict[str, Array]:
     """Space of each mesh that the same object moves, to the frame in which the ground's own is at some place (4, 4)."""
     to_frame, mover = place @ np.linalg.inv(world_matrix(ground)), mover_of(ground)
-    riders = (obj for obj in scene.objects if obj.type == "MESH" and obj != ground and mover_of(obj) == mover)
+    riders = (obj for obj in objects if obj.type == "MESH" and obj != ground and mover_of(obj) == mover)
     return {obj.name_full: to_frame @ world_matrix(obj) for obj in riders}
 
 

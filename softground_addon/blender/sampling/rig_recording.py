@@ -133,7 +133,7 @@ def _evaluate(
     simulated = any(is_simulated(object_named(obj)) for obj in props)
     source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, props, shapes, handled=handled)
     with source as name:
-        for frame in _simulated_before(scene, frames.start) if simulated else ():
+        for frame in _simulated_before(scene.rigidbody_world, frames.start) if simulated else ():
             with handlers_silent():
                 still_there(name).frame_set(frame)
             yield 0
@@ -211,11 +211,10 @@ def _moved_by_handlers(
     return False
 
 
-def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
+def _simulated_before(world: bpy.types.RigidBodyWorld | None, first: int) -> range:
     """Frames to step through before the first one.
 
     Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
     cache.
     """
-    world = scene.rigidbody_world
     return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)
