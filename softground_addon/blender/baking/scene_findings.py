@@ -144,7 +144,7 @@ def _clips(strips: Iterable[Any]) -> Iterator[Any]:
 
 
 def _lacks(owner: Any) -> str:
-    """What animation data or a strip lacks to move anything; an empty text where it plays."""
+    """Reason why animation data or a strip moves nothing; an empty text if it plays."""
     if owner.action is None:
         return "action"
     return "slot" if HAS_SLOTS and slot_of(owner) is None and len(owner.action.slots) else ""

@@ -116,7 +116,7 @@ _POSES = 16
 
 
 def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognised: Recognised) -> jobs.Job[float]:
-    """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
+    """Length of a rig's shortest sole [m]; 0 if it is unknown."""
     mapping, recording = recognised.mapping, recognised.recording
     if not mapping.soles:
         return 0.0

@@ -125,7 +125,7 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
 
 
 def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
-    """What names and rest pose say, or without a skin the current pose; empty where they say nothing."""
+    """Mapping by names and rest pose, or without a skin by the current pose; empty if none of them gives one."""
     try:
         return map_rig(armature, posed=posed)
     except InputError:

@@ -1,4 +1,4 @@
-"""Whether prints on a ground would show: its modifiers work on the ground as the playback has left it."""
+"""Checks that prints show on a ground whose modifiers act after the playback."""
 
 from __future__ import annotations
 

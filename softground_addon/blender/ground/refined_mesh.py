@@ -97,7 +97,7 @@ class Carried:
 
 
 def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
-    """What a mesh carries; `groups` are the names of its vertex groups."""
+    """Data of a mesh; `groups` are the names of its vertex groups."""
     coming = [given for given in source.attributes if given.data_type in LAYOUT and _comes_along(given.name)]
     edges, loose = _EMPTY, np.ones(len(source.edges), dtype=bool)
     if len(source.loops):

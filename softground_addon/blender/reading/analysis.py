@@ -152,7 +152,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
 
 @contextmanager
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
-    """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
+    """Context of changes that leave the shot as it was read: prints, response, a ground made to fit it."""
     if scene.session_uid in state.analyses:
         _tell_of_changes(scene.view_layers)  # of what others have changed until now, while it still counts
     analysis = known(scene)
@@ -180,7 +180,7 @@ def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = Non
 
 
 def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> jobs.Job[float | None]:
-    """What `expected_depth` does, in steps. The scene is asked for nothing after the first."""
+    """Job of `expected_depth`. The scene is asked for nothing after the first."""
     wanted = settings.snapshot(scene)
     analysis = yield from refreshing(scene)
     if analysis is None:
@@ -237,13 +237,13 @@ def _keep(
 
 
 def _hash_of(scene: bpy.types.Scene) -> str:
-    """What a shot is read from, as far as it is not seen in the settings."""
+    """Hash of the inputs of reading a shot that are not in the settings."""
     wanted = settings.snapshot(scene)
     return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
 
 
 def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
-    """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
+    """Inputs of reading a shot that are in the settings; a handler notices other edits."""
     return _parts(wanted)[0], ground and wanted.ground and _place(ground)
 
 
@@ -256,7 +256,7 @@ def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
-    """What the loads depend on, and the contacts: whatever acts on the prints but what a prediction is asked about."""
+    """Settings that loads and contacts depend on: all that act on prints, but for those that a prediction varies."""
     landing = any(character.force_model == "IMPULSE" or character.armature is None for character in wanted.characters)
     return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
 

@@ -61,7 +61,7 @@ def of_topology(mesh: bpy.types.Mesh) -> str:
 
 
 def of_positions(mesh: bpy.types.Mesh) -> str:
-    """Where the vertices of a mesh are without any bake."""
+    """Hash of the positions of a mesh without any bake."""
     rest = ground_mesh.rest_positions(mesh) + np.float32(0)  # Edit Mode makes negative zeros positive
     return f"{zlib.crc32(rest.data):08x}"
 

@@ -88,12 +88,12 @@ class Shot:
 
     @property
     def variation(self) -> PaintedSurface | None:
-        """How the ground varies from place to place, where it is painted."""
+        """Variation of the ground from place to place, if it is painted."""
         painted, ground = self.surface is not None and self.surface.factors is not None, soft_ground(self.terrain)
         return PaintedSurface(ground) if painted and isinstance(ground, MeshTerrain) else None
 
     def regions(self, wanted: BakeSettings) -> Regions | None:
-        """Where the ground is made of something else than the rest."""
+        """Regions of the ground with other materials."""
         ground = soft_ground(self.terrain)
         if self.surface is None or self.surface.kinds is None or not isinstance(ground, MeshTerrain):
             return None

@@ -69,7 +69,7 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
 
 
 def stamp_of(ground: bpy.types.Object) -> str:
-    """What is noted with a ground's bake of what it was made from; empty where nothing is."""
+    """Stamp stored with a ground's bake: hashes of its inputs; empty if there is none."""
     return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(FINGERPRINTS, ""))
 
 

@@ -85,7 +85,7 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
 
 
 def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
-    """Where such an armature is itself over time, (F, 4, 4) [Blender units]."""
+    """World matrices of such an armature over time, (F, 4, 4) [Blender units]."""
     return _transforms(armature, "", times)
 
 

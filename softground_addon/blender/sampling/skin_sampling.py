@@ -44,7 +44,7 @@ def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[st
 
 
 def left_out_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
-    """What shapes the meshes on some bones and is not read, by the name of the mesh."""
+    """Deformers of the meshes on some bones that are not read, by the name of the mesh."""
     on_bones = (obj for obj in meshes_on(objects, armature) if _is_on(obj, bones))
     return {obj.name: names for obj in on_bones if (names := left_out(obj))}
 

@@ -170,7 +170,7 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
 
 
 def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], Matter]:
-    """What `weather_places` takes of a bake, and how its ground takes weather.
+    """Input of `weather_places` from a bake, and the weather properties of its ground.
 
     By its footprints and what its record says about it; raises what `units_of` and `baked_with` of `baked_ground` do
     for damage.
@@ -190,7 +190,7 @@ def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[
 
 
 def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mapping[str, Any]) -> jobs.Job[WeatherPlaces]:
-    """What weather needs to know of the vertices."""
+    """Places of the vertices, for weather."""
     display_mesh = baked_ground.display_mesh_of(ground)
     with damage_named(ground):
         (known, _), unit_scale = of_bake(footprints, about), baked_ground.unit_of(about["inputs"], "unit_scale_m")

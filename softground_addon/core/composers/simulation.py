@@ -184,7 +184,7 @@ class ShotContact:
     pressing: PressingSole | None
 
     def recorded(self, steps: Steps) -> ContactSteps | None:
-        """What its footprint keeps of its steps."""
+        """Record of its steps for its footprint."""
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
     def layout(self, frames: Array, stride: int = 1) -> ContactLayout:

@@ -248,7 +248,7 @@ def load(content: bytes) -> BakeRecord:
 
 
 def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.StepEdit]]:
-    """What is known about the footprints in such bytes, and the artist's edits of them; errors as of `load`.
+    """Facts about the footprints in such bytes, and the artist's edits of them; errors as of `load`.
 
     The footprints themselves are not unpacked.
     """

@@ -81,7 +81,7 @@ class Recording:
         return bool(np.ptp(self.poses, axis=0).max(initial=0.0) > _STILL * np.abs(self.poses).max(initial=0.0))
 
     def bone(self, name: str) -> Array:
-        """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
+        """World matrices of a bone, (F, 4, 4) [m]; computed at each call, as all bones at once take much memory."""
         pose = self.poses[:, self.bones.index(name)].astype(float)
         return self._in_metres(self.world @ np.swapaxes(pose, -1, -2))
 
