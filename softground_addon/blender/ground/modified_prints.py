@@ -87,7 +87,7 @@ def are_undone(
 
 
 def undone_prints(ground: bpy.types.Object) -> Finding:
-    """What to tell the user of such a ground."""
+    """Message about such a ground."""
     if barrier := playback.barrier_on(ground):
         return Finding(
             "blocking_modifier",

@@ -293,7 +293,7 @@ class CourseNodes:
         return self.graph.combined(*(number.socket if isinstance(number, Number) else number for number in numbers))
 
     def _keep(self, *vectors: Number) -> list[Any]:
-        """Vectors as the rows keep them, all worked out together."""
+        """Vectors as the rows keep them, all computed together."""
         self.rows, captured = self.graph.captured(self.rows, *vectors, kind="VECTOR")
         return [vector.socket for vector in captured]
 

@@ -292,7 +292,7 @@ class _Vertices:
         return level - (1.0 - level.above(0.0)) * ENDLESS
 
     def _thawed(self, remaining: Number) -> Number:
-        """What has melted of snow of which so much would be left without [m]."""
+        """Melted depth of snow, at most the depth that would remain without thaw [m]."""
         graph, depth = self._graph, self._matter.snow_depth
         ratio = (1.0 - graph.number(graph.attribute(COMPACTED)) * (1.0 / depth)).at_least(0.0)
         around = self._course.around["thawed"].at_most(remaining)

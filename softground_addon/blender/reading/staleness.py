@@ -230,7 +230,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 
 
 def _of_standing(ground: bpy.types.Object) -> str:
-    """Where the ground is, told without having Blender evaluate anything: it calls the handlers, which ask this."""
+    """Hash of the place of the ground, without evaluating the scene: that calls the handlers, which ask this."""
     matrix = ground_surface.placed_by_parents(ground)
     if matrix is None or mover_of(ground):
         return f"{input_hashes.of_place([ground, *ancestors(ground)])}{_of_movement(ground, None)}"
@@ -250,7 +250,7 @@ def _modifiers_of(ground: bpy.types.Object) -> list[str]:
 
 
 def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
-    """What the ground's modifiers do, and how its material varies."""
+    """Hash of the ground's modifiers, and of the variation of its material."""
     keyed = input_hashes.animated_paths_of(ground)
     parts = [
         text for modifier in ground_mesh.users_modifiers(ground) for text in input_hashes.of_settings(modifier, keyed)
@@ -267,7 +267,7 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
 
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
-    """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
+    """Hash of what moves an object besides its keys and its parents: its rig, and all that it follows."""
     parents = ancestors(mover)
     known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
     # All of these are compared by themselves: here it counts only which is followed.

@@ -181,7 +181,7 @@ def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
 
 
 def edit_findings(record: BakeRecord) -> list[Finding]:
-    """Which of the artist's edits have lost their step."""
+    """Findings about edits of the artist that have lost their step."""
     steps = [
         Finding(
             "edit_without_step",

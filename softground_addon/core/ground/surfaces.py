@@ -121,7 +121,7 @@ class Voice:
 
 @dataclass(frozen=True)
 class Soaking:
-    """How fast ground takes up water: at first and in the end [m/s], and how fast it goes from one to the other [1/s].
+    """Rates at which ground takes up water: at first and in the end [m/s], and the decay between them [1/s].
 
     As Horton's f = final + (first - final)·exp(-decay·t). Water from below fills a print over a time `seep` [s].
     """
