@@ -25,8 +25,8 @@ from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
 from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
-from ..kept import kept
 from ..reading.shots import Shot
+from ..reuse import reused
 from .publish import marks_left, with_debris
 
 _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
@@ -70,12 +70,12 @@ def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Map
         return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), ground, edits))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, ground.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
-    stood = yield from kept(begun, "loads", source, _stood(wanted, shot))
+    stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
     painted = ground.variation, ground.regions  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, ground, edits)
-    return (yield from kept(begun, "prints", (read, before, after, painted, edits, skins), pressing))
+    return (yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing))
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
@@ -87,7 +87,8 @@ def _pressed(
     wanted: BakeSettings, shot: Shot, stood: _Stood, ground: SoftGround, edits: Mapping[str, StepEdit]
 ) -> Job[ShotPrints]:
     at_end, factors = Progress("simulate", 1.0), shot.surface.factors if shot.surface else None
-    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
+    seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
+    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
     carving = with_carves.slices(pressed.record, responses, shot.skins, ground, wanted.surface)

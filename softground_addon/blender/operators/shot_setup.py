@@ -13,7 +13,7 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import ground_presets, jobs, kept, session, settings
+from .. import ground_presets, jobs, reuse, session, settings
 from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
@@ -261,7 +261,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        kept.forget()
+        reuse.forget()
         with analysis.own_changes(scene):
             if ground is not None:
                 if baked_ground.has_remains(ground):

@@ -35,8 +35,8 @@ from ..characters.import_fixes import size_of
 from ..ground import ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
-from ..kept import kept
 from ..response.character_keys import ReadRig, controls_of
+from ..reuse import reused
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
 from ..sampling.control_poses import RigPoses
@@ -174,7 +174,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
     binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
+    soft = yield from reused(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
     hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
     terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing), wanted.frame)

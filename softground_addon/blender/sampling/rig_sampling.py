@@ -24,8 +24,8 @@ from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import LONGEST, skin_stances
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
-from ..kept import kept
 from ..placement import units_about
+from ..reuse import reused
 from ..rigs.rig_mapping import rest_bones
 from ..settings import name_of, resolve
 from .control_poses import RigPoses
@@ -137,7 +137,7 @@ def recorded_motion(
         if source.object
     }
     read = name, bones, mapping, recording, skin, mass, skin_mass, carried
-    return (yield from kept(len(recording.frames), "motion", read, _motion(*read), of=name))
+    return (yield from reused(len(recording.frames), "motion", read, _motion(*read), of=name))
 
 
 def _motion(

@@ -80,7 +80,7 @@ def press_shot(
     factors : (V, 3) float array, optional
         What is painted on the ground.
     seen : list of Footprint, optional
-        Takes each print once its contact ends, for who looks on; where bodies lean, once more in each pass.
+        Takes each print as soon as its contact ends, for a preview; where bodies lean, that of the first pass.
 
     Yields
     ------
@@ -108,7 +108,7 @@ def press_shot(
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground, seen)
+        footprints, forces = yield from _simulate(wanted, loads, ground)
     check_volumes(footprints, ground, factors)
     yield None
     record = yield from _edited(wanted, ground, footprints, edits)
@@ -134,7 +134,7 @@ def _edited(
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None
+    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None = None
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
