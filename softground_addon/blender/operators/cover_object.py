@@ -49,7 +49,8 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
         scene, obj = settings.scene_of(context), selected_ground(context)
         assert obj is not None
         if fault := ground_checks.hard_fault(obj):
-            raise InputError(fault.replace(" in Hard Ground", ""))
+            what = fault.partition(":")[0].replace(" in Hard Ground", "")
+            raise InputError(f"{what}: cover a copy of it that stands still.")
         unit, thickness = settings.units_of(scene).unit_scale_m, settings.typed(self.thickness_cm) / 100.0
         surface = ground_surface.undisturbed_surface(obj, unit)
         try:
@@ -61,6 +62,10 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
             ground = _object_of(laid, f"{obj.name} Cover", unit, thickness)
             created_ground.publish(scene, ground, options.material.surface)
         options.material.layer_depth, options.under = thickness, "NEVER"  # there is no earth below
+        options.painted.property_unset("layer_depth")
+        if obj not in settings.hard_grounds_of(options):
+            options.hard_grounds.add().object = obj
+            options.active_hard_ground = len(options.hard_grounds) - 1
         created_ground.select(scene, ground)
         self.report({"INFO"}, translated("'{name}' is now the ground", name=ground.name))
         return {"FINISHED"}

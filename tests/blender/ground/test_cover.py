@@ -37,6 +37,24 @@ def test_a_cover_is_the_ground_and_is_printed_no_deeper_than_it_is_thick(platfor
     assert "softground_layer" not in baked_ground.display_mesh_of(ground).data.attributes
     assert box.data.attributes.keys() == bpy.data.objects["Platform"].data.attributes.keys()
     assert not any(name.startswith("softground") for name in box.data.attributes.keys())  # noqa: SIM118
+    assert not [finding for finding in result.report["warnings"] if "Hard Ground" in finding]
+
+
+def test_what_is_covered_is_hard_ground_and_bears_beside_the_cover(platform):
+    options, box = platform.softground, bpy.context.object
+    options.painted.layer_depth = "Mine"  # of another ground
+    bpy.ops.softground.cover(thickness_cm=10.0)
+    assert [item.object for item in options.hard_grounds] == [box]
+    assert options.painted.layer_depth == "softground_layer_depth"
+    prints = bake(platform).footprints
+    options.hard_grounds.clear()
+    without = bake(platform).footprints
+    assert [step.max_depth_m for step in prints] == pytest.approx([step.max_depth_m for step in without])
+    options.hard_grounds.add().object = box
+    bpy.context.view_layer.objects.active = box
+    box.select_set(True)
+    bpy.ops.softground.cover(thickness_cm=5.0)
+    assert [item.object for item in options.hard_grounds] == [box]
 
 
 def test_a_cover_of_an_object_that_is_turned_scaled_and_modified_lies_on_what_is_seen(scene):
@@ -63,7 +81,7 @@ def test_what_cannot_be_covered_is_refused_and_nothing_changes(scene):
     bpy.context.object.keyframe_insert("location", frame=1)
     bpy.context.object.location.x = 1.0
     bpy.context.object.keyframe_insert("location", frame=10)
-    with pytest.raises(RuntimeError, match="'Plane' moves, as 'Plane' is animated"):
+    with pytest.raises(RuntimeError, match="'Plane' moves, as 'Plane' is animated: cover a copy"):
         bpy.ops.softground.cover()
     assert scene.softground.ground is None
     bpy.context.object.select_set(False)
