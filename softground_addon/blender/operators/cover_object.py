@@ -12,6 +12,7 @@ from .. import mesh_arrays, settings
 from ..drafts import none_left_if_it_fails
 from ..ground import created_ground, ground_checks, ground_surface
 from ..operator_base import reports_errors
+from ..placement import to_world, units_about
 from ..properties import SoftGroundPainted
 from ..reading import analysis
 from ..translation import translated
@@ -51,15 +52,17 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
         if fault := ground_checks.hard_fault(obj):
             what = fault.partition(":")[0].replace(" in Hard Ground", "")
             raise InputError(f"{what}: cover a copy of it that stands still.")
-        unit, thickness = settings.units_of(scene).unit_scale_m, settings.typed(self.thickness_cm) / 100.0
-        surface = ground_surface.undisturbed_surface(obj, unit)
+        options, thickness = scene.softground, settings.typed(self.thickness_cm) / 100.0
+        bodies = [character.armature for character in options.characters if character.armature]
+        units = units_about(scene, obj, bodies)
+        surface = ground_surface.undisturbed_surface(obj, units.unit_scale_m, frame=units.frame)
         try:
             laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
         except InputError as error:
             raise InputError(f"'{obj.name}' cannot be covered. {error}") from None
-        options = scene.softground
         with analysis.own_changes(scene):
-            ground = _object_of(laid, f"{obj.name} Cover", unit, thickness)
+            ground = _object_of(laid, f"{obj.name} Cover", units.unit_scale_m, thickness)
+            ground.matrix_basis = to_world(units.frame, obj)
             created_ground.publish(scene, ground, options.material.surface)
         options.material.layer_depth, options.under = thickness, "NEVER"  # there is no earth below
         options.painted.property_unset("layer_depth")

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender import mesh_arrays
 from softground_addon.blender.ground import baked_ground
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights
@@ -68,6 +69,22 @@ def test_a_cover_of_an_object_that_is_turned_scaled_and_modified_lies_on_what_is
     points = heights(scene.softground.ground)
     assert points[:, 2].max() == pytest.approx(2.0 + 5.0 + 2.0, abs=0.03)  # of 1 cm each
     assert np.hypot(*np.ptp(points[:, :2], axis=0)) > 70.0
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (9.81, 0.0, 0.0)])
+def test_a_cover_lies_where_gravity_holds_it_also_far_from_the_origin(scene, gravity):
+    place, up = np.array([500_000.0, 300_000.0, 10.0]), -np.array(gravity) / 9.81
+    for far in (0.0, 1.0):
+        bpy.ops.mesh.primitive_cube_add(location=place * far)
+        scene.gravity = gravity
+        bpy.ops.softground.cover(thickness_cm=10.0)
+        ground = scene.softground.ground
+        turn = np.array(ground.matrix_world)[:3, :3]
+        points = mesh_arrays.positions(ground.data) @ turn.T + (np.array(ground.location) - place * far)
+        assert points @ up == pytest.approx(np.clip(points @ up, 1.0, 1.1 + 1e-3), abs=1e-4)
+        assert np.ptp(points @ up) == pytest.approx(0.1, abs=1e-3)
+        across = np.sort(np.ptp(points, axis=0))
+        assert across == pytest.approx([0.1, 2.0, 2.0], abs=1e-3)
 
 
 def test_what_cannot_be_covered_is_refused_and_nothing_changes(scene):
