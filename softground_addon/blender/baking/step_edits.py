@@ -25,7 +25,7 @@ from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
 from ..carried import marks_object
 from ..debris import debris_object
-from ..ground import baked_ground, ground_mesh, ground_surface, painted_ground
+from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
 from . import bake_job, bake_report
@@ -92,6 +92,7 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
         If a step is to be moved of which the record keeps too little, or the ground cannot be written.
     """
     ground = scene.softground.ground
+    ground_checks.check_writable(ground)
     edits = {name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)}
     pressing = EditedSteps.left_with.slices(bake.steps, bake.record, edits)
     record = yield from jobs.meanwhile(jobs.Progress("simulate", 0.5), pressing)

@@ -21,6 +21,13 @@ def check_writable(ground: bpy.types.Object) -> None:
         )
     if ground.mode == "EDIT":
         raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
+    for key, beside in ground.items():  # debris and marks
+        if key.startswith("softground") and isinstance(beside, bpy.types.Object) and _is_edited(beside):
+            raise InputError(f"'{beside.name}' beside ground '{name}' is in Edit Mode: leave it with Tab first.")
+
+
+def _is_edited(obj: bpy.types.Object) -> bool:
+    return isinstance(obj.data, bpy.types.Mesh) and obj.data.is_editmode
 
 
 def check_playable(display_mesh: bpy.types.Object) -> None:

@@ -103,7 +103,7 @@ def as_edited(
     if carves:
         of_left = {row["step"]: row for row in reversed(rows)}
         wading = ((of_left.get(step.name), step, carves.get(step.index)) for step in steps)
-        rows += [_wade(row, step, carve) for row, step, carve in wading if row and carve and carve.compressed_m3 > 0]
+        rows += [_wade(row, step, carve) for row, step, carve in wading if row and carve and _is_cut(carve)]
     return _in_order(rows)
 
 
@@ -214,6 +214,11 @@ def _moved(row: Event, step: EditableStep) -> Event:
         return row
     height = row["position"][2] + after.position[2] - before.position[2]
     return row | {"position": [_rounded(value, 5) for value in (*place, height)]}
+
+
+def _is_cut(carve: Footprint) -> bool:
+    """True if a cut is left: later soles may press it level, and that of a step made small may fit no cell."""
+    return carve.compressed_m3 > 0 and bool(carve.tile(carve.compression).sum() > 0)
 
 
 def _wade(row: Event, step: EditableStep, carve: Footprint) -> Event:
