@@ -181,7 +181,7 @@ def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[
     material["layer_depth"] *= baked_ground.baked_with(about, "densest") or 1.0  # how far it can be pressed
     known = {
         "cell_size": baked_ground.unit_of(inputs, "cell_size_m"),
-        "time_stretch": baked_ground.unit_of(inputs, "time_stretch"),
+        "time_stretch": baked_ground.units_of(inputs).time_stretch,
         "felt": felt_in(inputs) is not None,
         "puddles": matter.soaking is not None,
         **material,

@@ -165,15 +165,6 @@ def shared_mesh(ground):
     bpy.data.objects.new("twin", ground.data)
 
 
-def animated(ground):
-    ground.keyframe_insert("location", frame=1)
-
-
-def animated_parent(ground):
-    ground.parent = bpy.data.objects.new("platform", None)
-    ground.parent.keyframe_insert("location", frame=1)
-
-
 def flattened(ground):
     ground.scale = (0.0, 0.0, 0.0)
     bpy.context.view_layer.update()
@@ -185,8 +176,6 @@ def flattened(ground):
         (no_faces, "no faces.*Create Ground"),
         (own_shape_key, "shape keys.*apply them"),
         (shared_mesh, "Make Single User"),
-        (animated, "stands still"),
-        (animated_parent, "'platform' is animated"),
         (flattened, "scale"),
     ],
 )
