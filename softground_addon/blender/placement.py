@@ -73,11 +73,13 @@ def _above_origin(rig: bpy.types.Object) -> Array:
     return np.asarray(toward / max(float(np.linalg.norm(toward)), TINY))
 
 
-def units_about(scene: bpy.types.Scene, obj: bpy.types.Object) -> SceneUnits:
-    """Frames and lengths of a scene, and the frame in which an object is read by itself."""
+def units_about(scene: bpy.types.Scene, obj: bpy.types.Object, bodies: Iterable[bpy.types.Object] = ()) -> SceneUnits:
+    """Frames and lengths of a scene, and the frame in which an object is read by itself, or with bodies on it."""
     place, units = np.eye(4), settings.units_of(scene)
     place[:3, 3] = world_matrix(obj)[:3, 3]
-    return replace(units, frame=still_frame(place, units, felt_gravity(settings.gravity_direction_of(scene), [obj])))
+    return replace(
+        units, frame=still_frame(place, units, felt_gravity(settings.gravity_direction_of(scene), [obj, *bodies]))
+    )
 
 
 def matrix_in(frame: GroundFrame, obj: bpy.types.Object) -> Array:

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 @dataclass
 class State:
-    """What goes on, and what need not be worked out again. Scenes, objects and images are known by session uid.
+    """State of what runs, and cached results. Scenes, objects and images are known by session uid.
 
     Attributes
     ----------

@@ -15,6 +15,8 @@ from ..node_graph import NodeGraph, Number
 from ..node_modifiers import new_group
 
 GROUP = "SoftGround Marks"
+VERSION = 2
+"""Of the laws that it plays; another bake replaces a group of an earlier one."""
 MARK = "softground_marks"
 """Custom property of the group, of its object and of the material."""
 

@@ -73,9 +73,10 @@ def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mappin
     """
     obj = of(ground)
     mesh: Any = obj and obj.data
-    if mesh is None or mesh.get(FLOORS) is None:
-        return
-    share, zone, step, before = (_values(mesh, name) for name in (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS))
+    names = (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS)
+    if mesh is None or mesh.get(FLOORS) is None or not {*names} <= {*mesh.attributes.keys()}:
+        return  # of an earlier bake, or the user's by now
+    share, zone, step, before = (_values(mesh, name) for name in names)
     films, _ = _floors(mesh[FLOORS]).films(steps, shed)
     each = np.array([films[number] for number in range(len(films))])
     mass = _or_nothing(each[step.astype(int), zone.astype(int)] * share, step.astype(int))
@@ -149,9 +150,9 @@ def _modifier_of(obj: bpy.types.Object) -> Any:
 
 
 def _group_for(group: Any, surface: str, units: SceneUnits) -> Any:
-    """The node group that marks have, or a new one if it is for another surface or other units."""
+    """The node group that marks have, or a new one if it is for another surface, other units or by earlier laws."""
     frame_rate = units.frame_rate * units.time_stretch
-    made_for = f"{surface} {frame_rate}"
+    made_for = f"{surface} {frame_rate} {nodes.VERSION}"
     if not group or group.get(MADE_FOR) != made_for:
         group = nodes.build(surfaces.sticking(surface), frame_rate=frame_rate)
         group[MADE_FOR] = made_for

@@ -1,4 +1,4 @@
-"""Whether a mesh can be the ground: what keeps it from taking a bake, and what to do about that."""
+"""Checks of a mesh that is to be the ground: faults that prevent a bake, with their remedies."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ def check_writable(ground: bpy.types.Object) -> None:
         )
     if ground.mode == "EDIT":
         raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
+    for key, beside in ground.items():  # debris and marks
+        if key.startswith("softground") and isinstance(beside, bpy.types.Object) and _is_edited(beside):
+            raise InputError(f"'{beside.name}' beside ground '{name}' is in Edit Mode: leave it with Tab first.")
+
+
+def _is_edited(obj: bpy.types.Object) -> bool:
+    return isinstance(obj.data, bpy.types.Mesh) and obj.data.is_editmode
 
 
 def check_playable(display_mesh: bpy.types.Object) -> None:
@@ -32,8 +39,7 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
 
 
 def hard_fault(obj: bpy.types.Object, ground: bpy.types.Object | None = None) -> str:
-    """What keeps soles from standing on an object as hard ground beside a ground, and the remedy; empty where nothing
-    does."""
+    """Fault that prevents soles from standing on an object as hard ground, and the remedy; empty if there is none."""
     name = obj.name
     if obj.type != "MESH":
         return (

@@ -12,6 +12,7 @@ from .. import mesh_arrays, settings
 from ..drafts import none_left_if_it_fails
 from ..ground import created_ground, ground_checks, ground_surface
 from ..operator_base import reports_errors
+from ..placement import to_world, units_about
 from ..properties import SoftGroundPainted
 from ..reading import analysis
 from ..translation import translated
@@ -49,18 +50,25 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
         scene, obj = settings.scene_of(context), selected_ground(context)
         assert obj is not None
         if fault := ground_checks.hard_fault(obj):
-            raise InputError(fault.replace(" in Hard Ground", ""))
-        unit, thickness = settings.units_of(scene).unit_scale_m, settings.typed(self.thickness_cm) / 100.0
-        surface = ground_surface.undisturbed_surface(obj, unit)
+            what = fault.partition(":")[0].replace(" in Hard Ground", "")
+            raise InputError(f"{what}: cover a copy of it that stands still.")
+        options, thickness = scene.softground, settings.typed(self.thickness_cm) / 100.0
+        bodies = [character.armature for character in options.characters if character.armature]
+        units = units_about(scene, obj, bodies)
+        surface = ground_surface.undisturbed_surface(obj, units.unit_scale_m, frame=units.frame)
         try:
             laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
         except InputError as error:
             raise InputError(f"'{obj.name}' cannot be covered. {error}") from None
-        options = scene.softground
         with analysis.own_changes(scene):
-            ground = _object_of(laid, f"{obj.name} Cover", unit, thickness)
+            ground = _object_of(laid, f"{obj.name} Cover", units.unit_scale_m, thickness)
+            ground.matrix_basis = to_world(units.frame, obj)
             created_ground.publish(scene, ground, options.material.surface)
         options.material.layer_depth, options.under = thickness, "NEVER"  # there is no earth below
+        options.painted.property_unset("layer_depth")
+        if obj not in settings.hard_grounds_of(options):
+            options.hard_grounds.add().object = obj
+            options.active_hard_ground = len(options.hard_grounds) - 1
         created_ground.select(scene, ground)
         self.report({"INFO"}, translated("'{name}' is now the ground", name=ground.name))
         return {"FINISHED"}

@@ -10,9 +10,9 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import jobs, session, settings
 from ..live import live
@@ -25,7 +25,6 @@ from ..state import state
 from . import overlay_shapes
 from .overlay_shapes import Cells, Outline
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
 
 SIDES: dict[str, Colour] = {"L": (0.25, 0.6, 1.0, 1.0), "R": (1.0, 0.35, 0.3, 1.0), "": (0.9, 0.8, 0.3, 1.0)}

@@ -150,10 +150,10 @@ class FloorSteps:
         """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
         density = surfaces.sticking(self.kind).density
         for step in steps:
-            if step.left is None or step.is_copy or (step.left.character, step.left.sole) != sole.of:
+            if step.footprint is None or step.is_copy or (step.footprint.character, step.footprint.sole) != sole.of:
                 continue
-            if (step.left.surface or self.ground) == self.kind and step.left.end_frame < sole.last_frame:
-                yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
+            if (step.footprint.surface or self.ground) == self.kind and step.footprint.end_frame < sole.last_frame:
+                yield Meeting(step.footprint.end_frame, shed=shed.get(step.index, 0.0) * density)
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,8 @@ def marks_of(
     """
     if not isinstance(terrain, HardOnSoft):
         return None
-    kinds = dict.fromkeys([surface, *(step.left.surface for step in steps if step.left and step.left.surface)])
+    prints = [step.footprint for step in steps if step.footprint]
+    kinds = dict.fromkeys([surface, *(footprint.surface for footprint in prints if footprint.surface)])
     sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
     sticking = [kind for kind in sticking if kind.carried is not None]
     if not sticking:
@@ -257,7 +258,7 @@ def _of_kind(
         dirty = sole.dirty if kind.name == ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = FloorSteps(kind.name, ground, tuple(soles))
-    at_most, _ = floors.films([replace(step, left=step.baked) for step in steps if not step.is_copy], {})
+    at_most, _ = floors.films([replace(step, footprint=step.baked) for step in steps if not step.is_copy], {})
     parts = [
         part for number, part in enumerate(parts) if (at_most[number][part.values["zone"]] * part.values["share"]).any()
     ]

@@ -94,7 +94,9 @@ def test_prints_are_shown_as_they_are_pressed_where_somebody_looks_on(scene):
     assert 0 in counts
     assert counts == sorted(counts)
     record = baked_ground.record_of(scene.softground.ground)
-    assert sorted(map(id, state.pressing.footprints)) == sorted(map(id, state.results["prints", ""][1].left.footprints))
+    assert sorted(map(id, state.pressing.footprints)) == sorted(
+        map(id, state.results["prints", ""][1].record.footprints)
+    )
     assert len(record.footprints) == len(state.pressing.footprints) > 0
     session.show_no_bake()
     assert state.pressing is None

@@ -13,6 +13,7 @@ from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.output import exports
+from softground_addon.core.errors import InputError
 from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
@@ -158,6 +159,20 @@ def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
     assert mine.name == "Mine"
 
 
+def test_marks_of_an_earlier_bake_play_by_the_present_laws_after_another(scene):
+    obj = marks_object.of(scene.softground.ground)
+    set_input(obj, "Drying", 3.0)
+    modifier = obj.modifiers[0]
+    modifier.node_group["softground_marks_made_for"] = "mud 24.0"  # before it rained on marks
+    interface = modifier.node_group.interface
+    interface.remove(interface.items_tree["Rain"])
+    bake(scene)
+    inputs = node_modifiers.inputs_of(modifier)
+    assert "Rain" in inputs
+    assert compat.read_input(modifier, inputs["Drying"]) == 3.0
+    assert len([group for group in bpy.data.node_groups if "Marks" in group.name]) == 1
+
+
 @pytest.mark.parametrize("change", ["switched off", "dry sand"])
 def test_a_bake_that_leaves_none_takes_older_ones_away(scene, change):
     if change == "dry sand":
@@ -251,6 +266,48 @@ def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(sce
     assert state_of(obj)[1] == pytest.approx(before[1], abs=1e-6)
     assert state_of(obj)[0] == pytest.approx(before[0], abs=1e-6)
     assert len(at(scene, frame).vertices) == count
+
+
+def test_marks_in_edit_mode_refuse_bakes_edits_and_clear_and_nothing_changes(scene):
+    ground = scene.softground.ground
+    obj, before = marks_object.of(ground), heights(ground)
+    mass = state_of(obj)[1]
+    twin = obj.copy()  # with the same mesh
+    scene.collection.objects.link(twin)
+    bpy.context.view_layer.objects.active = twin
+    twin.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    name = baked_ground.steps_of(ground)[0].name
+    for job in (lambda: bake(scene), lambda: edit(scene, {name: StepEdit(mute=True)}), bpy.ops.softground.clear_bake):
+        with pytest.raises((InputError, RuntimeError), match=r"'SoftGround Marks' beside ground .* is in Edit Mode"):
+            job()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert (state_of(obj)[1] == mass).all()
+    assert (heights(ground) == before).all()
+    assert not baked_ground.record_of(ground).edits
+
+
+def test_marks_that_the_user_has_changed_stay_as_they_are_with_edits_of_steps(scene):
+    obj = marks_object.of(scene.softground.ground)
+    obj.data.attributes.remove(obj.data.attributes["share"])
+    before = state_of(obj)
+    edit(scene, {step.name: StepEdit(mute=True) for step in baked_ground.steps_of(scene.softground.ground)})
+    assert (state_of(obj)[1] == before[1]).all()
+
+
+@pytest.mark.parametrize(
+    "change", [StepEdit(move_m=(0.3, 0.1)), StepEdit(scale=1.3), StepEdit(turn_deg=30.0), StepEdit(shift_frames=40.0)]
+)
+def test_marks_of_steps_that_are_moved_are_those_of_another_bake(scene, change):
+    obj = marks_object.of(scene.softground.ground)
+    before = state_of(obj)
+    edit(scene, {step.name: change for step in baked_ground.steps_of(scene.softground.ground)})
+    edited = state_of(obj)
+    bake(scene)
+    again = state_of(obj)
+    assert again[1] == pytest.approx(edited[1], abs=1e-6)
+    assert again[0] == pytest.approx(edited[0], abs=1e-6)
+    assert (edited[1].sum() == pytest.approx(before[1].sum())) == (change.shift_frames == 0.0)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender import mesh_arrays
 from softground_addon.blender.ground import baked_ground
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights
@@ -37,6 +38,24 @@ def test_a_cover_is_the_ground_and_is_printed_no_deeper_than_it_is_thick(platfor
     assert "softground_layer" not in baked_ground.display_mesh_of(ground).data.attributes
     assert box.data.attributes.keys() == bpy.data.objects["Platform"].data.attributes.keys()
     assert not any(name.startswith("softground") for name in box.data.attributes.keys())  # noqa: SIM118
+    assert not [finding for finding in result.report["warnings"] if "Hard Ground" in finding]
+
+
+def test_what_is_covered_is_hard_ground_and_bears_beside_the_cover(platform):
+    options, box = platform.softground, bpy.context.object
+    options.painted.layer_depth = "Mine"  # of another ground
+    bpy.ops.softground.cover(thickness_cm=10.0)
+    assert [item.object for item in options.hard_grounds] == [box]
+    assert options.painted.layer_depth == "softground_layer_depth"
+    prints = bake(platform).footprints
+    options.hard_grounds.clear()
+    without = bake(platform).footprints
+    assert [step.max_depth_m for step in prints] == pytest.approx([step.max_depth_m for step in without])
+    options.hard_grounds.add().object = box
+    bpy.context.view_layer.objects.active = box
+    box.select_set(True)
+    bpy.ops.softground.cover(thickness_cm=5.0)
+    assert [item.object for item in options.hard_grounds] == [box]
 
 
 def test_a_cover_of_an_object_that_is_turned_scaled_and_modified_lies_on_what_is_seen(scene):
@@ -52,6 +71,22 @@ def test_a_cover_of_an_object_that_is_turned_scaled_and_modified_lies_on_what_is
     assert np.hypot(*np.ptp(points[:, :2], axis=0)) > 70.0
 
 
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (9.81, 0.0, 0.0)])
+def test_a_cover_lies_where_gravity_holds_it_also_far_from_the_origin(scene, gravity):
+    place, up = np.array([500_000.0, 300_000.0, 10.0]), -np.array(gravity) / 9.81
+    for far in (0.0, 1.0):
+        bpy.ops.mesh.primitive_cube_add(location=place * far)
+        scene.gravity = gravity
+        bpy.ops.softground.cover(thickness_cm=10.0)
+        ground = scene.softground.ground
+        turn = np.array(ground.matrix_world)[:3, :3]
+        points = mesh_arrays.positions(ground.data) @ turn.T + (np.array(ground.location) - place * far)
+        assert points @ up == pytest.approx(np.clip(points @ up, 1.0, 1.1 + 1e-3), abs=1e-4)
+        assert np.ptp(points @ up) == pytest.approx(0.1, abs=1e-3)
+        across = np.sort(np.ptp(points, axis=0))
+        assert across == pytest.approx([0.1, 2.0, 2.0], abs=1e-3)
+
+
 def test_what_cannot_be_covered_is_refused_and_nothing_changes(scene):
     bpy.ops.mesh.primitive_plane_add(rotation=(np.pi / 2, 0.0, 0.0))
     bpy.context.view_layer.update()
@@ -63,7 +98,7 @@ def test_what_cannot_be_covered_is_refused_and_nothing_changes(scene):
     bpy.context.object.keyframe_insert("location", frame=1)
     bpy.context.object.location.x = 1.0
     bpy.context.object.keyframe_insert("location", frame=10)
-    with pytest.raises(RuntimeError, match="'Plane' moves, as 'Plane' is animated"):
+    with pytest.raises(RuntimeError, match="'Plane' moves, as 'Plane' is animated: cover a copy"):
         bpy.ops.softground.cover()
     assert scene.softground.ground is None
     bpy.context.object.select_set(False)

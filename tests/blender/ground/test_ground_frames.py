@@ -268,7 +268,7 @@ def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
     result = bake(short_walk)
     short_walk.frame_set(20)
     edited = jobs.run(step_edits.reading(short_walk))
-    name = edited.left.steps[1].name
+    name = edited.record.steps[1].name
     jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
     left = baked_ground.record_of(short_walk.softground.ground).edited
     assert len(left) == len(result.footprints)

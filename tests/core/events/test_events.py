@@ -8,7 +8,10 @@ import pytest
 from softground_addon.core.debris.step_throws import throws_of
 from softground_addon.core.events.events import COLUMNS, as_edited, between, events
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.ground.sparse_grid import Window
+from softground_addon.core.record.edits import UNCHANGED, StepEdit, step_id
+from softground_addon.core.record.footprints import FootprintRecorder, quantised
+from softground_addon.core.record.moved_carve import moved_carve
 from softground_addon.core.record.record import BakeRecord
 from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed, walk
 
@@ -160,6 +163,23 @@ def test_a_copy_has_the_events_of_its_step_when_it_presses(baked, table):
     assert [row["frame"] - 6 for row in of_copy] == pytest.approx([row["frame"] for row in of_step], abs=1e-5)
     assert [row["time_s"] - 6 / 30 for row in of_copy] == pytest.approx([row["time_s"] for row in of_step], abs=1e-5)
     assert rows == sorted(rows, key=lambda row: row["frame"])
+
+
+@pytest.mark.parametrize(("filled", "scale", "wades"), [(0.0, 1.0, True), (0.3, 1.0, False), (0.0, 0.1, False)])
+def test_a_cut_of_which_nothing_is_left_is_no_wading(baked, table, filled, scale, wades):
+    """A sole has pressed it level since, or the step is so small now that no cell shows it."""
+    footprints = baked[1]
+    recorder, cell = FootprintRecorder(0.02, 1.0), Window(20, 20, 1, 1)
+    for frame, cut in ((10.0, 0.3), (20.0, -filled)):
+        recorder.add(frame, cell, quantised(np.array([[[cut]], [[0.0]]])), np.zeros((1, 1), bool))
+    span = {"character": "Walker", "sole": "foot.L", "start_frame": 10.0, "end_frame": 20.0, "heading": 0.0}
+    volumes = {"compressed_m3": 0.3 * 0.02**2, "rim_m3": 0.0, "unplaced_rim_m3": 0.0}
+    arrays = {"position": footprints[0].position, "load_frames": np.zeros(0), "load_n": np.zeros(0)}
+    carve = recorder.footprint(**span, **volumes, **arrays, area_m2=0.0, peak_force_n=0.0)
+    carve = moved_carve(carve, np.array([0.41, 0.414, 0.0]) + 0.03, UNCHANGED, StepEdit(scale=scale))
+    rows = as_edited(table, BakeRecord(footprints, {}).steps, {0: carve})
+    assert ([row["phase"] for row in rows if row["phase"] == "wade"] == ["wade"]) == wades
+    assert all(np.isfinite(row["position"]).all() for row in rows)
 
 
 def test_times_count_from_the_first_frame_that_is_asked_for(table):

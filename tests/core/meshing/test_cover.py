@@ -46,3 +46,26 @@ def test_what_is_too_steep_or_looks_down_is_refused():
 
 def test_a_large_roof_has_no_more_vertices_than_a_mesh_can_take():
     assert len(cover(BOX * (40, 40, 1), SIDES, 0.05, 0.02).vertices) < 410_000
+
+
+@pytest.mark.parametrize("size", [(1.03, 0.47, 1.0), (0.015, 2.0, 1.0), (0.005, 0.007, 1.0)])
+def test_a_box_of_any_size_is_covered_from_edge_to_edge_alike(size):
+    laid = cover(BOX * size, SIDES, 0.1, 0.04)
+    x, y = laid.vertices[:, 0], laid.vertices[:, 1]
+    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((0.0, size[0], 0.0, size[1]))
+    from_edge = np.min([x, size[0] - x, y, size[1] - y], axis=0)
+    circle = np.sqrt(0.1**2 - (0.1 - np.clip(from_edge, 0, 0.1)) ** 2)
+    assert laid.thickness == pytest.approx(circle, abs=1e-6)
+    assert laid.thickness.max() > 0.0
+
+
+def test_what_is_too_narrow_is_refused_instead_of_covered_by_nothing():
+    corner = np.array([(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0001, 0.0)])
+    with pytest.raises(InputError, match="too narrow"):
+        cover(corner, np.array([(0, 1, 2)]), 0.1, 0.04)
+
+
+def test_a_thick_cover_is_as_coarse_as_its_edge_allows():
+    laid = cover(BOX * (24, 24, 1), SIDES, 5.0, 0.04)
+    assert laid.thickness.max() == pytest.approx(5.0)
+    assert len(laid.vertices) < 80**2  # 0.04 m would look at 360,000 places, each with 64,000 around it
