@@ -62,7 +62,7 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
     units = replace(settings.units_of(scene), frame=GroundFrame(rows(np.linalg.inv(from_origin))))
-    matrices, *of_hard = jobs.run(_paths(scene, [ground, *map(settings.found, wanted.hard_grounds)], frames, units))
+    matrices, *of_hard = jobs.run(_paths(scene, [ground, *map(settings.resolve, wanted.hard_grounds)], frames, units))
     axes = axes_of(matrices)
     shape = np.swapaxes(axes, -1, -2) @ matrices[:, :3, :3]
     if np.ptp(shape, axis=0).max() > STIFF * np.abs(shape).max():
