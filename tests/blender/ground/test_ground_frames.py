@@ -312,8 +312,8 @@ def test_early_prints_are_drawn_where_the_bake_puts_them(short_walk, where):
         field(short_walk)
         moved(short_walk, WHERE[where])
     session.show_bake(0.0, "")
-    steps = jobs.run(bake_job.bake(short_walk)).report["steps"]
     try:
+        steps = jobs.run(bake_job.bake(short_walk)).report["steps"]
         prints = sorted(state.pressing.footprints, key=lambda each: each.start_frame)
         drawn = [overlay.corners_of(each, state.pressing, short_walk) for each in prints]
     finally:
