@@ -23,7 +23,8 @@ from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.record import EditableStep
-from .film import ZONES, CarriedMass, Meeting, carry, share_left
+from .film import ZONES, CarriedMass, Meeting, share_left
+from .floor_steps import FloorSteps, SoleOnFloors
 from .hard_print import HardPrint, SoleGrid, laid, sole_grid
 
 LOOKED_AT = 32
@@ -80,83 +81,6 @@ class Marks:
 
 
 @dataclass(frozen=True)
-class SoleOnFloors:
-    """The way of a sole over hard floors, whatever it carries.
-
-    Attributes
-    ----------
-    of : (str, str)
-        Character and sole.
-    areas : (4,) float array
-        Of its zones [m²].
-    last_frame : float
-        Of the shot.
-    dirty : float
-        Film as the shot starts, over the thickest.
-    meetings : sequence of Meeting
-        With hard floors, in the order of time.
-    marks : sequence of int
-        Number of the mark that each of these leaves; -1 of none.
-    """
-
-    of: tuple[str, str]
-    areas: Array
-    last_frame: float
-    dirty: float
-    meetings: tuple[Meeting, ...]
-    marks: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class FloorSteps:
-    """Steps of all soles on hard floors: what they leave follows from these and the steps on soft ground.
-
-    Attributes
-    ----------
-    kind, ground : str
-        What they carry, and what the ground is made of where a step does not say.
-    soles : sequence of SoleOnFloors
-    """
-
-    kind: str
-    ground: str
-    soles: tuple[SoleOnFloors, ...]
-
-    def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
-        """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
-
-        Parameters
-        ----------
-        steps : sequence of EditableStep
-            On the soft ground, as the artist leaves them.
-        shed : mapping of int to float
-            Volume that each sheds in the air, by its number [m³].
-        """
-        carried = surfaces.sticking(self.kind).carried
-        assert carried is not None
-        films: dict[int, Array] = {}
-        booked = CarriedMass()
-        for sole in self.soles:
-            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
-            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
-            giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
-            films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
-            booked += of_sole
-        return films, booked
-
-    def _soft_meetings(
-        self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
-    ) -> Iterator[Meeting]:
-        """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
-        density = surfaces.sticking(self.kind).density
-        for step in steps:
-            if step.left is None or step.is_copy or (step.left.character, step.left.sole) != sole.of:
-                continue
-            if (step.left.surface or self.ground) == self.kind and step.left.end_frame < sole.last_frame:
-                yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
-
-
-@dataclass(frozen=True)
 class _Contact:
     """A contact of a sole with a hard floor: where it lies, its slide in sole lengths, frames, and what wets it."""
 
@@ -208,9 +132,9 @@ def marks_of(
     """
     if not isinstance(terrain, HardOnSoft):
         return None
-    kinds = dict.fromkeys([surface, *(step.left.surface for step in steps if step.left and step.left.surface)])
-    sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
-    sticking = [kind for kind in sticking if kind.carried is not None]
+    prints = [step.left or step.baked for step in steps]
+    kinds = dict.fromkeys([surface, *(print_.surface for print_ in prints if print_.surface), *terrain.wet])
+    sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
     laid_out: list[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]] = []
@@ -231,7 +155,7 @@ def marks_of(
             sole = SoleOnFloors(of, _by_zone(grid, grid.area), float(character.motion.frames[-1]), dirty, (), ())
             laid_out.append((grid, contacts, sole, treads.get(of, 0.0)))
     whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
-    return max(whole, key=lambda marks: marks.carried.left_behind, default=None)
+    return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
 
 def _of_kind(
