@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from types import MappingProxyType
 from typing import Any
 
@@ -90,16 +91,13 @@ class _Contact:
     wet: str
 
 
-@dataclass(frozen=True)
-class _Mark:
-    """A mark, its faces, and the values of its vertices as `Marks` has them."""
-
-    number: int
-    faces: NDArray[np.intp]
-    values: dict[str, Any]
-
-
-_COLUMNS = ("position", "birth", "mass", "area", "sole", "tread", "share", "zone")
+_Mark = dict[str, Any]
+"""The faces of a mark, and the values of its vertices, as `Marks` has them."""
+_NOTHING: _Mark = {
+    **dict.fromkeys(("birth", "mass", "area", "tread", "share"), np.zeros(0)),
+    **dict.fromkeys(("position", "sole"), np.zeros((0, 3))),
+    **{"zone": np.zeros(0, np.intp), "faces": np.zeros((0, 4), np.intp)},
+}
 
 
 @sliced
@@ -177,18 +175,15 @@ def _of_kind(
             of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)
             meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), of_zones))
             marks.append(-1 if is_wet else len(parts))
-            parts += [] if is_wet else [_mark(grid, contact, share, tread, len(parts))]
+            parts += [] if is_wet else [_mark(grid, contact, share, tread)]
         dirty = sole.dirty if kind.name == ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = FloorSteps(kind.name, ground, tuple(soles))
     at_most, _ = floors.films([replace(step, left=step.baked) for step in steps if not step.is_copy], {})
-    parts = [
-        part for number, part in enumerate(parts) if (at_most[number][part.values["zone"]] * part.values["share"]).any()
-    ]
-    numbers = {part.number: number for number, part in enumerate(parts)}
-    floors = replace(
-        floors, soles=tuple(replace(sole, marks=tuple(numbers.get(mark, -1) for mark in sole.marks)) for sole in soles)
-    )
+    weighs = [bool((at_most[n][part["zone"]] * part["share"]).any()) for n, part in enumerate(parts)]
+    numbers = np.append(np.where(weighs, np.cumsum(weighs) - 1, -1), -1).astype(int)
+    soles = [replace(sole, marks=tuple(numbers[list(sole.marks)].tolist())) for sole in soles]
+    parts, floors = list(compress(parts, weighs)), replace(floors, soles=tuple(soles))
     return _joined(parts, floors).with_steps(steps, shed)
 
 
@@ -229,10 +224,11 @@ def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number: int) -> _Mark:
+def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float) -> _Mark:
     """The mark of one contact that leaves a share at each node of the grid."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
-    values = {
+    return {
+        "faces": faces.reshape(-1, 4),
         "position": contact.laid.position[used],
         "birth": contact.frames[contact.laid.touched[used]],
         "mass": np.zeros(len(used)),
@@ -242,14 +238,11 @@ def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number:
         "share": share[used],
         "zone": grid.zone[used],
     }
-    return _Mark(number, faces.reshape(-1, 4), values)
 
 
 def _joined(parts: Sequence[_Mark], floors: FloorSteps) -> Marks:
-    first = np.cumsum([0, *(len(part.values["mass"]) for part in parts)])
-    none, places = np.zeros(0), np.zeros((0, 3))
-    nothing = dict.fromkeys(_COLUMNS, none) | {"position": places, "sole": places, "zone": np.zeros(0, np.intp)}
-    whole: Any = {name: np.concatenate([nothing[name], *(part.values[name] for part in parts)]) for name in _COLUMNS}
-    faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
-    faces = np.concatenate([np.zeros((0, 4), np.intp), *faces])
-    return Marks(faces=faces, step=np.repeat(np.arange(len(parts)), np.diff(first)), floors=floors, **whole)
+    counts = [len(part["mass"]) for part in parts]
+    first = np.cumsum([0, *counts])
+    parts = [part | {"faces": part["faces"] + start} for part, start in zip(parts, first, strict=False)]
+    whole: Any = {name: np.concatenate([none, *(part[name] for part in parts)]) for name, none in _NOTHING.items()}
+    return Marks(step=np.repeat(np.arange(len(parts)), np.array(counts, int)), floors=floors, **whole)
