@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import kept, session, translation, tread_images
+from . import reuse, session, translation, tread_images
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -135,7 +135,7 @@ def before_load(*_: Any) -> None:
         live.forget()
     analysis.forget()
     tread_images.forget()
-    kept.forget()
+    reuse.forget()
 
 
 @persistent

@@ -95,7 +95,7 @@ def counted(
 
 
 def meanwhile(state: State, slices: Slices[Result]) -> Generator[State, None, Result]:
-    """A computation that knows nothing of Blender, in slices; before each, the driver is told the same state."""
+    """A computation that knows nothing of Blender, in slices; before each, the job yields the same state."""
     while True:
         yield state
         try:

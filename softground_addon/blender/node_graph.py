@@ -140,7 +140,7 @@ class NodeGraph:
         return node.outputs["Geometry"]
 
     def captured(self, geometry: Any, *numbers: Number, kind: str = "FLOAT") -> tuple[Any, list[Number]]:
-        """The geometry with numbers or vectors that are worked out together and once, and these as it has them."""
+        """The geometry with numbers or vectors that are computed together and once, and these as it has them."""
         node = self.node("GeometryNodeCaptureAttribute", domain="POINT")
         names = [f"Value {count}" for count in range(len(numbers))]
         if [item.name for item in node.capture_items] != names:
@@ -154,7 +154,7 @@ class NodeGraph:
         return node.outputs["Geometry"], [self.number(node.outputs[name]) for name in names]
 
     def forgotten(self, geometry: Any, *names: str) -> Any:
-        """Without some attributes, so that nothing carries them on."""
+        """The geometry without some attributes."""
         for name in names:
             node = self.node("GeometryNodeRemoveAttribute")
             self.link(geometry, node.inputs["Geometry"])

@@ -30,13 +30,13 @@ def loaded(path: Path) -> presets.Preset:
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
     """The presets of a folder by name, and what is wrong with the files that are none."""
-    found, broken = [], []
+    readable, broken = [], []
     for path in sorted(folder.glob("*.json")):
         try:
-            found.append((path, loaded(path)))
+            readable.append((path, loaded(path)))
         except InputError as error:
             broken.append(str(error))
-    return sorted(found, key=lambda entry: entry[1].name.casefold()), broken
+    return sorted(readable, key=lambda entry: entry[1].name.casefold()), broken
 
 
 def named(name: str) -> presets.Preset:

@@ -1,4 +1,4 @@
-"""Everything that Blender is told about, in order; taken back in the reverse order."""
+"""Registration of everything with Blender, in order; undone in the reverse order."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core.ground.heightfield import Terrain
+from ..core.motion.ground_frame import GroundFrame
 from ..core.record.footprints import Footprint
 from .state import state
 from .translation import CONTEXT
@@ -85,21 +86,27 @@ class Pressing:
 
     Attributes
     ----------
+    scene : str
+        Name of the scene that is baked: windows may show others.
     terrain : Terrain
         The undisturbed ground.
+    frame : GroundFrame or None
+        That terrain and prints are in, instead of the world.
     footprints : list of Footprint
     shapes : list
-        What the viewport draws of them, of as many as it was drawn with.
+        Triangles of the first of them, as the viewport has drawn them.
     """
 
+    scene: str
     terrain: Terrain
+    frame: GroundFrame | None
     footprints: list[Footprint] = field(default_factory=list)
     shapes: list[Any] = field(default_factory=list)
 
 
-def show_pressing(terrain: Terrain) -> list[Footprint] | None:
-    """The list whose prints the viewport shows until the bake of the moment ends; None where nobody looks on."""
-    state.pressing = Pressing(terrain) if state.is_baking else None
+def show_pressing(scene: str, terrain: Terrain, frame: GroundFrame | None) -> list[Footprint] | None:
+    """The list whose prints the viewport shows until the bake ends; None where no window shows the bake."""
+    state.pressing = Pressing(scene, terrain, frame) if state.is_baking else None
     return state.pressing and state.pressing.footprints
 
 

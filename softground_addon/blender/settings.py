@@ -63,7 +63,7 @@ def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
 
 
 def _wet_grounds(options: Any) -> tuple[str, ...]:
-    """With what each of the hard objects is wet; none if all are dry."""
+    """Liquid on each of the hard objects, "" for a dry one; empty if all are dry."""
     liquids = {item.object: item.wet.lower() for item in reversed(options.hard_grounds) if item.wet != "NONE"}
     wet = tuple(liquids.get(obj, "") for obj in hard_grounds_of(options))
     return wet if any(wet) else ()
@@ -123,7 +123,7 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
 
 
 def gravity_direction_of(scene: bpy.types.Scene) -> tuple[float, float, float]:
-    """Where a scene's gravity points, of length 1; down where it is switched off."""
+    """Unit vector of a scene's gravity; down if it is switched off."""
     if not (scene.use_gravity and scene.gravity.length > 0):
         return DOWN
     x, y, z = scene.gravity.normalized()[:]
@@ -288,7 +288,7 @@ def find(name: ObjectName) -> bpy.types.Object | None:
     return obj
 
 
-def found(name: ObjectName) -> bpy.types.Object:
+def resolve(name: ObjectName) -> bpy.types.Object:
     """The object of a name, whatever it is called by now.
 
     Raises

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 @dataclass
 class State:
-    """What goes on, and what need not be worked out again. Scenes, objects and images are known by session uid.
+    """State of what runs, and cached results. Scenes, objects and images are known by session uid.
 
     Attributes
     ----------
@@ -59,8 +59,8 @@ class State:
     existing : dict
         Number of users of each object when it was last looked for in the collections, and True if it was in one. Going
         through the collections takes too long to be done in `draw`; who leaves one has a user less.
-    kept : dict
-        Results by kind and name, after a hash of all that they follow from and before their size; see `kept`.
+    results : dict
+        Results by kind and name, after a hash of all that they follow from and before their size; see `reuse`.
     tread_maps : dict
         Maps as text by image and file; empty of those that cannot be read.
     catalogues : dict
@@ -95,7 +95,7 @@ class State:
     preset_choices: list[tuple[str, str, str]] = field(default_factory=list)
     pictures: Any = None
     existing: dict[int, tuple[int, bool]] = field(default_factory=dict)
-    kept: dict[tuple[str, str], tuple[str, Any, int]] = field(default_factory=dict)
+    results: dict[tuple[str, str], tuple[str, Any, int]] = field(default_factory=dict)
     tread_maps: dict[tuple[int, str], str] = field(default_factory=dict)
     catalogues: dict[str, dict[tuple[str, str], str]] = field(default_factory=dict)
 

@@ -114,7 +114,7 @@ class RegionSettings:
 
     @property
     def kind(self) -> GroundKind | None:
-        """What it is made of; None where it is hard."""
+        """Kind of its ground; None if it is hard."""
         return GroundKind(self.surface, self.material) if self.material else None
 
 

@@ -5,7 +5,7 @@ import time
 import bpy
 import pytest
 
-from softground_addon.blender import jobs, kept
+from softground_addon.blender import jobs, reuse
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
@@ -136,7 +136,7 @@ def test_a_bake_on_the_ground_of_the_first_takes_little_longer(scene, frames):
 
 
 def _anew(scene):
-    kept.forget()
+    reuse.forget()
     return seconds_to_bake(scene)
 
 
@@ -154,7 +154,7 @@ def test_a_bake_after_a_change_works_out_only_what_follows_from_it(scene, settin
     for number in range(6):
         setattr(scene.softground, setting, values[number // 2 % 2])
         if number % 2:
-            kept.forget()
+            reuse.forget()
         took[bool(number % 2)].append(seconds_to_bake(scene))
     whole, again = min(took[True]), min(took[False][1:])
     print(f"\n{setting}: whole {whole:.2f} s, again {again:.2f} s, {again / whole:.2f} times")

@@ -13,7 +13,7 @@ import pytest
 
 from softground_addon.blender.ground import created_ground
 from softground_addon.blender.live import live
-from softground_addon.blender.settings import found
+from softground_addon.blender.settings import resolve
 from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.ground.heightfield import FlatTerrain
 from tests.blender.shots import walker
@@ -33,7 +33,7 @@ def ground_of(scene):
     half = np.array([EXTENT / 2 - 0.02, EXTENT / 2 - 0.02])
     layout = created_ground.lay_out(GroundPlan(-half, half, FlatTerrain()), EXTENT / SIDE, 1.0)
     with ExitStack() as drafts:
-        ground = found(created_ground.draft(drafts, layout))
+        ground = resolve(created_ground.draft(drafts, layout))
         scene.collection.objects.link(ground)
     scene.softground.ground = ground
     bpy.context.view_layer.update()

@@ -57,7 +57,7 @@ def bake(folder: Path) -> dict[str, object]:
         "material": display_mesh.material_slots[0].material.name,
         "pieces": [list(one.diffuse_color) for one in bpy.data.materials if "Pieces" in one.name],
         "debris": len(debris.data.vertices),
-        "thrown_m3": sum(sum(step.thrown.values()) for step in baked_ground.record_of(ground).steps if step.left),
+        "thrown_m3": sum(sum(step.thrown.values()) for step in baked_ground.record_of(ground).steps if step.footprint),
         "modifiers": [modifier.name for modifier in display_mesh.modifiers],
         "events": baked_ground.events_of(ground),
     }

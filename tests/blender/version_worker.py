@@ -59,7 +59,7 @@ def edit(blend: str, saved: str, told: str) -> None:
     from softground_addon.core.record.edits import StepEdit, step_id
 
     with _editable(blend) as (scene, bake, change):
-        one, other = (step_id(step) for step in bake.left.footprints[1:3])
+        one, other = (step_id(step) for step in bake.record.footprints[1:3])
         before = _stored(scene)
         change({one: StepEdit(mute=True), other: StepEdit(move_m=(0.05, 0.02), turn_deg=7.0)})
         bpy.ops.wm.save_as_mainfile(filepath=saved)

@@ -1,4 +1,4 @@
-"""What a bake must fulfil before anything is written."""
+"""Checks of a bake before anything is written."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MOST_MISSED = 0.02
 def check_motion(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> None:
     """Raise InputError if nobody moves, and keys hold nobody in a pose."""
     still = [finding for motion in motions if (finding := no_motion(motion))]
-    rigs = [settings.found(character.armature) for character in wanted.characters if character.armature]
+    rigs = [settings.resolve(character.armature) for character in wanted.characters if character.armature]
     if len(still) == len(motions) and not any(map(holds_a_pose, rigs)):
         raise InputError(" ".join(finding.text for finding in still))
 
@@ -110,7 +110,7 @@ def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_si
 
 
 def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[Finding]:
-    """What the user should know about prints that leave the fine part of a ground."""
+    """Findings about prints beyond the fine part of a ground."""
     if not (cover.is_fine_somewhere and cover.is_coarse(cell_size)):
         return []
     if detail == "NEVER":
@@ -133,7 +133,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
 
 
 def copy_findings(ground: bpy.types.Object) -> list[Finding]:
-    """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
+    """Findings about a finer copy of a ground: it holds what modifiers show in the viewport."""
     # Nodes may scatter objects for renders only, and those stay.
     hidden = (modifier for modifier in ground.modifiers if modifier.show_render and not modifier.show_viewport)
     names = [

@@ -27,10 +27,10 @@ from ...core.findings import Finding
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.motion.motion import shortest_sole
-from ...core.record import record
 from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
+from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
 from .. import settings
 from ..carried import marks_object
@@ -51,7 +51,7 @@ from .shot_prints import shot_prints
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake leaves behind, apart from the ground itself.
+    """Result of a bake, apart from the ground itself.
 
     Attributes
     ----------
@@ -106,8 +106,8 @@ def bake(
     wanted = with_shoe_treads(wanted, shot.motions)
     frames = wanted.frames[1] - wanted.frames[0] + 1
     prints = yield from shot_prints(wanted, shot, ground, edits)
-    left, debris, marks, happened = prints.left, prints.debris, prints.marks, prints.happened
-    footprints = left.footprints  # with all of their rims
+    record, debris, marks, happened = prints.record, prints.debris, prints.marks, prints.happened
+    footprints = record.footprints  # with all of their rims
     simulated = time.perf_counter()
 
     inputs = wanted.inputs()
@@ -117,19 +117,19 @@ def bake(
         inputs["regions_crc32"] = f"{zlib.crc32(surface.kinds.tobytes()):08x}"
     painted = inputs.get("painted_crc32", "") + inputs.get("regions_crc32", "")
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
-    findings = [*prints.findings, *said, *edit_findings(left), *response_job.keyed_responses(wanted)]
+    findings = [*prints.findings, *said, *edit_findings(record), *response_job.keyed_responses(wanted)]
     of_responses = response_findings(prints.responses)
     build_report = partial(
         report.build,
         inputs=inputs,
         input_hash=input_hash,
-        steps=left.steps,
-        carves=left.laid_carves,
-        edits=left.edits,
+        steps=record.steps,
+        carves=record.laid_carves,
+        edits=record.edits,
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, left.steps, left.laid_carves),
+        events=as_edited(happened, record.steps, record.laid_carves),
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
@@ -140,7 +140,9 @@ def bake(
     published: Published | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        published, of_ground = yield from write_prints(scene, wanted, shot, left.with_about(about), debris, sole_length)
+        published, of_ground = yield from write_prints(
+            scene, wanted, shot, record.with_about(about), debris, sole_length
+        )
         findings += of_ground
         marks_object.put(published.ground, marks, surface=marks.floors.kind if marks else wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
@@ -162,12 +164,12 @@ def bake(
     if published:
         sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
-    return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
+    return BakeResult(result, tuple(step.footprint or step.baked for step in record.steps if not step.is_copy))
 
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
     """A shot, and what the user should know of what it was read from; InputError if nobody moves in what is written."""
-    moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
+    moving = bake_report.ground_findings(settings.resolve(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
     if write:
         check_motion(wanted, shot.motions)
@@ -182,7 +184,7 @@ def write_prints(
     scene: bpy.types.Scene,
     wanted: BakeSettings,
     shot: Shot,
-    left: record.BakeRecord,
+    record: BakeRecord,
     debris: Debris | None,
     sole_length: float,
 ) -> Job[tuple[Published, list[Finding]]]:
@@ -192,17 +194,17 @@ def write_prints(
     ----------
     shot : Shot
         Of its ground; the motions are not needed.
-    left : BakeRecord
+    record : BakeRecord
         The inputs that it is about are told the name of a ground that is created.
     debris : Debris or None
         What its steps throw.
     sole_length : float
         Of the shortest sole [m].
     """
-    weather_before = weather.values_of(settings.found(wanted.ground)) if wanted.ground else {}
+    weather_before = weather.values_of(settings.resolve(wanted.ground)) if wanted.ground else {}
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        pressing = PressedGround.at.slices(left.shaping, **at_the_end(wanted))
+        pressing = PressedGround.at.slices(record.shaping, **at_the_end(wanted))
         pressed = yield from meanwhile(Progress("write", 0.05), pressing)
         yield Progress("write", 0.05)
         trail = pressed.trail(trail_detail.FLOOR)
@@ -211,14 +213,14 @@ def write_prints(
         if shot.surface is None:
             assert shot.plan is not None
             place = yield from _created(drafts, scene, wanted, shot.plan, trail)
-            left.about["inputs"]["ground"] = place.display_mesh.name
+            record.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
-        publishing = publish(left, debris, place, wanted)
+        publishing = publish(record, debris, place, wanted)
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
-    weather.renew(published.ground, weather_before, left)
+    weather.renew(published.ground, weather_before, record)
     return published, findings
 
 
@@ -261,7 +263,7 @@ def _given(
         Progress("write", 0.1), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.1), coverage.slices(vertices, index, trail.printed, cell_size))
-    ground = settings.found(name)
+    ground = settings.resolve(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
     too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
     if not too_coarse and not wants_detail(ground, cover, detail, cell_size, sole_length):
@@ -272,12 +274,12 @@ def _given(
     refinement = yield from meanwhile(
         Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
-    drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
+    drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement)
     drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
         Progress("write", 0.15), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
-    ground, draft = settings.found(name), settings.found(drafted_name)
+    ground, draft = settings.resolve(name), settings.resolve(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]

@@ -1,4 +1,4 @@
-"""What is said of a bake: its inputs, tables for the report, and what no longer fits it."""
+"""Report of a bake: its inputs, tables for the report, and what no longer fits it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LAST_FRAME = "last_frame"
 
 
 def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding]:
-    """What the user should know of a ground that changes its shape over time, taken at a frame."""
+    """Findings about a ground that changes its shape over time, read at one frame."""
     modifier = still_ground.changes_with_time(ground) if ground else ""
     if not (ground and modifier):
         return []
@@ -52,7 +52,7 @@ def hidden_skins(objects: settings.Objects, wanted: BakeSettings, motions: Seque
         average = {m.sole.name for m in motion.soles if m.sole.prop is None and m.sole.underside is None}
         if not average or not character.armature:
             continue
-        armature = settings.found(character.armature)
+        armature = settings.resolve(character.armature)
         bones = {
             bone for sole in character.soles if sole.name in average for bone in (sole.bone, sole.toe_bone) if bone
         }
@@ -70,7 +70,7 @@ def hidden_skins(objects: settings.Objects, wanted: BakeSettings, motions: Seque
 
 
 def shapes_left_out(objects: settings.Objects, wanted: BakeSettings) -> list[Finding]:
-    """What shapes the skin of the feet and was not read."""
+    """Findings about deformers of the feet's skin that were not read."""
     findings = []
     for character in wanted.characters:
         if not character.armature:
@@ -83,13 +83,13 @@ def shapes_left_out(objects: settings.Objects, wanted: BakeSettings) -> list[Fin
                 f"The skin of '{body}' was read without {' and '.join(causes)}.",
                 "Check that its feet lie in their prints; if not, apply it or switch it off.",
             )
-            for body, causes in left_out_on(objects, settings.found(character.armature), bones).items()
+            for body, causes in left_out_on(objects, settings.resolve(character.armature), bones).items()
         ]
     return findings
 
 
 def summary(result: dict[str, Any]) -> dict[str, float]:
-    """What the panel shows of a bake."""
+    """Summary of a bake for the panel."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
     shown = {key: totals[key] for key in ground_mesh.SHOWN}
@@ -98,7 +98,7 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
 
 
 def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
-    """What the panel shows of prints that no bake reported, such as those kept of live mode."""
+    """Summary for the panel of prints that no bake reported, such as those kept of live mode."""
     return {
         "steps": len(footprints),
         "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
@@ -108,6 +108,6 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
 
 
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
-    """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
+    """Changes since the bake on the scene's ground, as texts for the user; none if it is up to date."""
     wanted = weather.felt(settings.snapshot(scene))
     return staleness.reasons(scene.softground.ground, scene.objects, wanted)

@@ -41,7 +41,7 @@ Faults = dict[str, dict[str, dict[str, dict[str, float]]]]
 
 @dataclass(frozen=True)
 class CleanFeet:
-    """What Clean Feet leaves behind beside the layers.
+    """Result of Clean Feet, apart from the layers.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def _with_legs(character: CharacterSettings) -> CharacterSettings:
     """A character with the legs of feet that hang elsewhere or are the ends of shins, where no leg of it is mapped."""
     if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
         return character
-    armature, soles = settings.found(character.armature), [sole.bone for sole in character.soles if sole.bone]
+    armature, soles = settings.resolve(character.armature), [sole.bone for sole in character.soles if sole.bone]
     legs = legs_of_feet(armature, soles) or legs_on_shins(armature, soles)
     return replace(character, joints={**character.joints, **legs})
 
@@ -160,7 +160,7 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
 
 
 def _travels(motion: CharacterMotion, travels: NDArray[np.bool_]) -> list[str]:
-    """What is said of feet that travel (F, S) along the floor."""
+    """Summary of feet that travel (F, S) along the floor."""
     said = []
     for sole, during in zip(motion.soles, travels.T, strict=True):
         ways = ", ".join(f"{motion.frames[a]:g}-{motion.frames[b - 1]:g}" for a, b in zip(*runs(during), strict=True))
@@ -173,7 +173,7 @@ def _travels(motion: CharacterMotion, travels: NDArray[np.bool_]) -> list[str]:
 
 
 def _left_out(wanted: BakeSettings, shot: Shot) -> tuple[str, ...]:
-    """What is said of soles that are not feet."""
+    """Note on soles that are not feet."""
     names: list[str] = []
     for motion, character in zip(shot.motions, wanted.characters, strict=True):
         if character.armature:

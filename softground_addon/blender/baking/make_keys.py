@@ -61,7 +61,7 @@ class MadeKeys:
 
     @property
     def warning(self) -> str:
-        """What could not be keyed; empty where all was."""
+        """Warning about what could not be keyed; empty if everything was."""
         if not self.layered:
             return ""
         return (

@@ -1,4 +1,4 @@
-"""From a record and a place to the ground that plays it: the only code that does this, whatever the record is from."""
+"""Publishing of a record on a ground, which then plays it; every record passes through here."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
 from ...core.carried.marks import Marks, marks_of
 from ...core.composers.relief_plan import BARS, relief_at, shod_of
@@ -18,12 +16,13 @@ from ...core.debris.thrown_debris import thrown
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.loads.estimate import CharacterLoads
+from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.plants.tramplings import Tramplings, tramplings
 from ...core.playback.playback_curves import playback_curves_at
-from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
+from ...core.record.record import BakeRecord, dump
 from ...core.record.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.settings import Acts, BakeSettings
@@ -35,8 +34,6 @@ from ..jobs import Job, Progress, meanwhile
 from ..plants import trampling_table
 from ..playback import display_key, playback
 from ..reading import staleness
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -60,13 +57,13 @@ def at_the_end(made_with: BakeSettings) -> dict[str, float]:
 
 @sliced
 def with_debris(
-    left: record.BakeRecord, ground: SoftGround, made_with: BakeSettings, loads: Sequence[CharacterLoads] | None = None
-) -> Slices[tuple[record.BakeRecord, Debris | None]]:
+    record: BakeRecord, ground: SoftGround, made_with: BakeSettings, loads: Sequence[CharacterLoads] | None = None
+) -> Slices[tuple[BakeRecord, Debris | None]]:
     """A record with the debris of its steps booked, if asked for; see `core.debris.thrown_debris.thrown`."""
     if loads is not None and not made_with.debris:
-        return left, None
+        return record, None
     throwing = thrown.slices(
-        left,
+        record,
         ground,
         surface=made_with.surface,
         cell_size=made_with.cell_size_m,
@@ -78,7 +75,7 @@ def with_debris(
 
 @sliced
 def marks_left(
-    left: record.BakeRecord,
+    record: BakeRecord,
     terrain: Terrain,
     made_with: BakeSettings,
     loads: Sequence[CharacterLoads],
@@ -87,11 +84,11 @@ def marks_left(
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
         return None
-    shod = shod_of(made_with.inputs(), left.footprints) if made_with.tread_m > 0 else ()
+    shod = shod_of(made_with.inputs(), record.footprints) if made_with.tread_m > 0 else ()
     return (
         yield from marks_of.slices(
             loads,
-            left.steps,
+            record.steps,
             terrain,
             surface=made_with.surface,
             shed=shed_volumes(debris) if debris is not None else {},
@@ -101,7 +98,7 @@ def marks_left(
     )
 
 
-def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:
+def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: BakeSettings) -> Job[Published]:
     """Let a ground play a record, as the artist's edits leave it. Nothing that the user sees changes before the end.
 
     Parameters
@@ -111,8 +108,8 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
     place : Place
         Where it goes.
     """
-    footprints = left.shaping
-    stored = yield from meanwhile(Progress("write", 0.2), record.dump.slices(left))
+    footprints = record.shaping
+    stored = yield from meanwhile(Progress("write", 0.2), dump.slices(record))
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)
     sample = yield from meanwhile(Progress("write", 0.25), sample_at.slices(footprints, x, y, **moment))
@@ -147,7 +144,7 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             unit_scale=made_with.unit_scale_m,
             frame=made_with.frame,
             shape_keys=made_with.shape_keys
-            and (made_with.dense_shape_keys or not display_key.is_dense(settings.found(place.display_mesh))),
+            and (made_with.dense_shape_keys or not display_key.is_dense(settings.resolve(place.display_mesh))),
             marks=marks,
             water=water_at(relief, len(x)),
             layer=partial(under_layer.layers, made_with=made_with),
@@ -168,16 +165,18 @@ def publish(left: record.BakeRecord, debris: Debris | None, place: Place, made_w
             yield Progress("write", 0.95)
         trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
         shown = show()
-    ground = settings.found(made_with.ground) if made_with.ground else shown
-    of_steps = {step.index: step.left.surface for step in left.steps if step.left and step.left.surface}
+    ground = settings.resolve(made_with.ground) if made_with.ground else shown
+    of_steps = {
+        step.index: step.footprint.surface for step in record.steps if step.footprint and step.footprint.surface
+    }
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
     return Published(ground, shown, error)
 
 
 def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:
-    """What soles trample, where plants give way to it."""
-    if made_with.ground is None or trampling_table.of(settings.found(made_with.ground)) is None:
+    """Trampling by the soles; None if no plants give way."""
+    if made_with.ground is None or trampling_table.of(settings.resolve(made_with.ground)) is None:
         return None
     return (yield from meanwhile(Progress("write", 0.95), tramplings.slices(footprints)))
 

@@ -72,7 +72,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     wanted = replace(settings_of(scene), response=None)
     for moving in wanted.characters:
         if moving.armature:
-            check_layerable(settings.found(moving.armature))
+            check_layerable(settings.resolve(moving.armature))
     shot = yield from read_shot(scene, wanted, LayerKind.ROOT_MOTION)
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
@@ -88,7 +88,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     if not layers:
         raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
     for name, travel, curves in layers:
-        armature = settings.found(name)
+        armature = settings.resolve(name)
         for kind in LayerKind:  # the others were made for a walk on the spot
             remove_layer(armature, kind)
         layer = Layer(curves, {SPEED: f"{travel.speed:.4f}"})
@@ -114,7 +114,7 @@ def _layer(
 ) -> tuple[Travel, list[LayerCurve]]:
     """The keys of one character: on the bone that moves its whole rig, else on the armature object."""
     assert character.armature
-    armature = settings.found(character.armature)
+    armature = settings.resolve(character.armature)
     bone = _bone(view_layer, armature, RigMapping(character.joints, character.soles, "settings"))
     path = path_of_bone(bone, "location") if bone else "location"
     duration = (motion.frames[-1] - motion.frames[0]) / motion.frame_rate

@@ -1,4 +1,4 @@
-"""What is not at work in a scene though its user may think so, or works otherwise in a bake: each with its remedy."""
+"""Findings about animation that does not act in a scene, or acts otherwise in a bake; each with its remedy."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NO_MOTION = ("hide", "show_", "color", "display", "layers", "is_visible")
 
 
 def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> list[Finding]:
-    """What the user should know of a scene whose shot was just read."""
+    """Findings about a scene whose shot was just read."""
     movers = [mover for character in wanted.characters for mover in staleness.movers_of(character)]
     followed = list(dict.fromkeys(node for mover in movers for node in (mover, *all_leaders(mover))))
     first, last = (frame * wanted.time_stretch for frame in wanted.frames)
@@ -144,7 +144,7 @@ def _clips(strips: Iterable[Any]) -> Iterator[Any]:
 
 
 def _lacks(owner: Any) -> str:
-    """What animation data or a strip lacks to move anything; an empty text where it plays."""
+    """Reason why animation data or a strip moves nothing; an empty text if it plays."""
     if owner.action is None:
         return "action"
     return "slot" if HAS_SLOTS and slot_of(owner) is None and len(owner.action.slots) else ""
@@ -179,7 +179,7 @@ def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
 def _followed_shapes(wanted: BakeSettings) -> Iterator[Finding]:
     """Bodies without an armature, whose contacts are parts of a shape that changes."""
     for character in wanted.characters:
-        if character.body and any(map(deforms, meshes_of(settings.found(character.body)))):
+        if character.body and any(map(deforms, meshes_of(settings.resolve(character.body)))):
             yield Finding(
                 "followed_shape",
                 "note",

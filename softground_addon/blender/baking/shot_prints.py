@@ -1,4 +1,4 @@
-"""What a shot leaves: pressed from the settings and from what was read, or as the last bake has it from the same."""
+"""Prints of a shot: pressed, or taken from the last bake of the same inputs."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
 from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
-from ..kept import kept
 from ..reading.shots import Shot
+from ..reuse import reused
 from .publish import marks_left, with_debris
 
 _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
@@ -35,11 +35,11 @@ _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
 
 @dataclass(frozen=True)
 class ShotPrints:
-    """What a shot leaves.
+    """Prints of a shot, and what else a bake writes of it.
 
     Attributes
     ----------
-    left : BakeRecord
+    record : BakeRecord
         Prints that soles press, as they are and as they are edited, and what bodies carve.
     debris : Debris or None
         What steps throw.
@@ -53,7 +53,7 @@ class ShotPrints:
         Offsets, forces and gaps, for the report.
     """
 
-    left: BakeRecord
+    record: BakeRecord
     debris: Debris | None
     marks: Marks | None
     responses: list[CharacterResponse]
@@ -63,19 +63,19 @@ class ShotPrints:
 
 
 def shot_prints(wanted: BakeSettings, shot: Shot, ground: SoftGround, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
-    """What a shot leaves; errors as of `loads_standing` and `press_shot`."""
+    """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
     if not isinstance(ground.terrain, MeshTerrain):  # what is made or hard is not compared
         return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), ground, edits))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, ground.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
-    stood = yield from kept(begun, "loads", source, _stood(wanted, shot))
+    stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
     painted = ground.variation, ground.regions  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, ground, edits)
-    return (yield from kept(begun, "prints", (read, before, after, painted, edits, skins), pressing))
+    return (yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing))
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
@@ -87,34 +87,35 @@ def _pressed(
     wanted: BakeSettings, shot: Shot, stood: _Stood, ground: SoftGround, edits: Mapping[str, StepEdit]
 ) -> Job[ShotPrints]:
     at_end, factors = Progress("simulate", 1.0), shot.surface.factors if shot.surface else None
-    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, session.show_pressing(shot.terrain))
+    seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
+    pressing = press_shot(wanted, shot.motions, *stood, ground, edits, factors, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     responses = [(each.motion, each.response) for each in pressed.responses]
-    carving = with_carves.slices(pressed.left, responses, shot.skins, ground, wanted.surface)
-    left = yield from meanwhile(at_end, carving)
-    throwing = with_debris.slices(left, ground, wanted, pressed.loads)
-    left, debris = yield from meanwhile(at_end, throwing)
-    marking = marks_left.slices(left, shot.terrain, wanted, pressed.loads, debris)
+    carving = with_carves.slices(pressed.record, responses, shot.skins, ground, wanted.surface)
+    record = yield from meanwhile(at_end, carving)
+    throwing = with_debris.slices(record, ground, wanted, pressed.loads)
+    record, debris = yield from meanwhile(at_end, throwing)
+    marking = marks_left.slices(record, shot.terrain, wanted, pressed.loads, debris)
     marks = yield from meanwhile(at_end, marking)
-    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, left.edited)
+    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, record.edited)
     gaps = yield from meanwhile(at_end, measuring)
     name = wanted.ground.name if wanted.ground else "the ground"
-    checking = self_check.slices(pressed.loads, left.footprints, shot.terrain, wanted.cell_size_m, name)
+    checking = self_check.slices(pressed.loads, record.footprints, shot.terrain, wanted.cell_size_m, name)
     findings = yield from meanwhile(at_end, checking)
-    happening = events.slices(pressed.loads, left.footprints, surface=wanted.surface, first_frame=wanted.frames[0])
+    happening = events.slices(pressed.loads, record.footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     return ShotPrints(
-        left,
+        record,
         debris,
         marks,
         pressed.responses,
-        (*findings, *_bottomed_out(wanted, left.footprints, name)),
+        (*findings, *_bottomed_out(wanted, record.footprints, name)),
         (yield from meanwhile(at_end, happening)),
         {"offsets_mm": offsets_mm(pressed.loads), "forces": pressed.forces, "gaps_mm": gaps},
     )
 
 
 def _bottomed_out(wanted: BakeSettings, footprints: Sequence[Footprint], ground: str) -> list[Finding]:
-    """What to say of steps that end at the bottom of the deepest layer of their surface."""
+    """Findings about steps that end at the bottom of the deepest layer of their surface."""
     by_depth = sorted(wanted.kinds[0], key=lambda kind: kind.material.deepest)
     findings = []
     for surface, material in {kind.surface: kind.material for kind in by_depth}.items():

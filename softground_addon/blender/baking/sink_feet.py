@@ -33,7 +33,7 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene.objects, wanted)
     if hashes and wanted.ground:
-        edits = baked_ground.edits_of(settings.found(wanted.ground))
+        edits = baked_ground.edits_of(settings.resolve(wanted.ground))
         hashes |= staleness.of_soles(scene.objects, mesh_soles(edits))
     result = yield from bake(scene, wanted=wanted)
     options = scene.softground
@@ -41,8 +41,8 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     options.grounding.use = True
     if options.output == "PRINTS":
         options.output = "BOTH"
-    if wanted.ground is not None and baked_ground.is_baked(settings.found(wanted.ground)):
-        _note(settings.found(wanted.ground), wanted, result, hashes)
+    if wanted.ground is not None and baked_ground.is_baked(settings.resolve(wanted.ground)):
+        _note(settings.resolve(wanted.ground), wanted, result, hashes)
     return result
 
 

@@ -17,9 +17,9 @@ from ...core.errors import InputError
 from ...core.ground import surfaces
 from ...core.ground.material import Pressure
 from ...core.ground.presets import validate_material
-from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
+from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings, RegionSettings
 from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
@@ -49,14 +49,14 @@ class EditableBake:
         The undisturbed ground; nobody is on it.
     """
 
-    left: record.BakeRecord
+    record: BakeRecord
     made_with: BakeSettings
     shot: Shot
     steps: EditedSteps
 
-    def with_edits(self, edits: Mapping[str, StepEdit]) -> record.BakeRecord:
+    def with_edits(self, edits: Mapping[str, StepEdit]) -> BakeRecord:
         """The record with other edits in place of those that it has."""
-        return EditedSteps.left_with(self.steps, self.left, edits)
+        return EditedSteps.left_with(self.steps, self.record, edits)
 
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
@@ -68,18 +68,18 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
         If there is none, or its record does not say what it was made with.
     """
     ground = scene.softground.ground
-    left = baked_ground.record_of(ground)
-    made_with = _made_with(settings.snapshot(scene), left)
+    record = baked_ground.record_of(ground)
+    made_with = _made_with(settings.snapshot(scene), record)
     names = painted_ground.names_of(ground, made_with.painted)
     of_slots, frame = made_with.kinds[1], made_with.frame
     undisturbed = ground_surface.undisturbed_surface.slices(ground, made_with.unit_scale_m, names, of_slots, frame)
     surface = yield from jobs.meanwhile(jobs.Progress("sample", 0.5), undisturbed)
-    low, high = _extent(left)
+    low, high = _extent(record)
     looking = ground_surface.terrain_of.slices(surface, np.stack([low - AROUND, high + AROUND]))
     terrain = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), looking)
     shot = Shot((), low, high, None, surface, terrain)
     return EditableBake(
-        left, made_with, shot, EditedSteps(left.footprints, ground_of(made_with, shot), made_with.cell_size_m)
+        record, made_with, shot, EditedSteps(record.footprints, ground_of(made_with, shot), made_with.cell_size_m)
     )
 
 
@@ -94,24 +94,24 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
     ground = scene.softground.ground
     ground_checks.check_writable(ground)
     edits = {name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)}
-    pressing = EditedSteps.left_with.slices(bake.steps, bake.left, edits)
-    left = yield from jobs.meanwhile(jobs.Progress("simulate", 0.5), pressing)
+    pressing = EditedSteps.left_with.slices(bake.steps, bake.record, edits)
+    record = yield from jobs.meanwhile(jobs.Progress("simulate", 0.5), pressing)
     shown, stamp = baked_ground.display_mesh_of(ground), staleness.stamp_of(ground)
     warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)
-    lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]
+    lengths = [step.pressed_by.pressing.sole.length for step in record.footprints if step.pressed_by]
     sole_length = min(lengths, default=FALLBACK_SOLE)
-    is_deleted = bool(left.thrown) and debris_object.of(ground) is None
-    throwing = with_debris.slices(left, ground_of(bake.made_with, bake.shot), bake.made_with)
-    left, debris = yield from jobs.meanwhile(jobs.Progress("simulate", 1.0), throwing)
+    is_deleted = bool(record.thrown) and debris_object.of(ground) is None
+    throwing = with_debris.slices(record, ground_of(bake.made_with, bake.shot), bake.made_with)
+    record, debris = yield from jobs.meanwhile(jobs.Progress("simulate", 1.0), throwing)
     shed = shed_volumes(debris) if debris is not None else {}
     debris = None if is_deleted else debris
-    published, _ = yield from bake_job.write_prints(scene, bake.made_with, bake.shot, left, debris, sole_length)
-    marks_object.follow(published.ground, left.steps, shed)
+    published, _ = yield from bake_job.write_prints(scene, bake.made_with, bake.shot, record, debris, sole_length)
+    marks_object.follow(published.ground, record.steps, shed)
     sign(
         published,
         bake.made_with,
         _sole_hashes(scene.objects, stamp, bake, edits),
-        summary=summary | bake_report.summary_of_prints(left.edited),
+        summary=summary | bake_report.summary_of_prints(record.edited),
         warnings=warnings,
         stamp=stamp,
     )
@@ -121,17 +121,17 @@ def _sole_hashes(
     objects: settings.Objects, stamp: str, bake: EditableBake, edits: Mapping[str, StepEdit]
 ) -> dict[str, str]:
     """Hashes of the meshes whose soles press steps, of those that were not read again as they were noted."""
-    soles, before = mesh_soles(edits), mesh_soles(bake.left.edits)
+    soles, before = mesh_soles(edits), mesh_soles(bake.record.edits)
     noted: dict[str, str] = json.loads(stamp) if stamp else {}
     now = staleness.of_soles(objects, soles)
     same = {f"{staleness.SOLE}:{name}" for name, sole in soles.items() if before.get(name) == sole}
     return {key: noted.get(key, value) if key in same else value for key, value in now.items()}
 
 
-def _made_with(now: BakeSettings, left: record.BakeRecord) -> BakeSettings:
+def _made_with(now: BakeSettings, record: BakeRecord) -> BakeSettings:
     """The settings of now, with those that the prints were pressed and put on the ground with."""
     try:
-        inputs = {"under": "AUTO", **left.about["inputs"]}
+        inputs = {"under": "AUTO", **record.about["inputs"]}
         writing = {"under": "AUTO", **now.between(Acts.WRITING, Acts.WRITING)}
         on_ground = {name: type(value)(inputs[name]) for name, value in writing.items()}
         surfaces.find(inputs["surface"])
@@ -166,9 +166,9 @@ def _region(said: Mapping[str, Any]) -> RegionSettings:
     return RegionSettings(int(said["slot"]), str(said["preset"]), str(said["surface"]), material)
 
 
-def _extent(left: record.BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _extent(record: BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lower and upper corner of all prints [m]."""
-    footprints = (*left.footprints, *left.edited)
+    footprints = (*record.footprints, *record.edited)
     if not footprints:
         raise InputError("The bake has no steps to edit: check that the feet touch the ground, and bake again.")
     return extent(footprints)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.ground.sparse_grid import Window
+from ...core.numerics.arrays import Array
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
@@ -18,8 +19,6 @@ from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import display_key, playback
 from .publish import at_the_end
 from .step_edits import EditableBake
-
-Array = NDArray[np.float64]
 
 REACH = 4.0
 """How far around a print the display blur spreads it, in its standard deviations."""
@@ -46,20 +45,20 @@ class StepPreview:
 
     def show(self, edits: Mapping[str, StepEdit]) -> None:
         """Show the ground with these edits."""
-        left = self._bake.with_edits(edits)
-        baked = self._bake.left
-        windows = _windows(dict(enumerate(baked.footprints)), baked.pressed_again, left.pressed_again)
-        windows += _windows({}, baked.laid_carves, left.laid_carves)
+        edited = self._bake.with_edits(edits)
+        baked = self._bake.record
+        windows = _windows(dict(enumerate(baked.footprints)), baked.pressed_again, edited.pressed_again)
+        windows += _windows({}, baked.laid_carves, edited.laid_carves)
         near = np.flatnonzero(self._within([*windows, *self._changed], self._x, self._y))
         self._changed = windows
         positions = self._before.copy()
         made_with = self._bake.made_with
-        sample = sample_at(left.shaping, self._x[near], self._y[near], **at_the_end(made_with))
+        sample = sample_at(edited.shaping, self._x[near], self._y[near], **at_the_end(made_with))
         positions[near] = self._rest[near] + (sample.display[:, None] * self._up).astype(np.float32)
         self._write(positions)
         if self._pieces:  # of those that move, and on ground that moves: they are thrown anew once the step is let go
-            before = {step.index: step.edit for step in self._bake.left.steps}
-            changed = [step.index for step in left.steps if step.edit != before.get(step.index)]
+            before = {step.index: step.edit for step in self._bake.record.steps}
+            changed = [step.index for step in edited.steps if step.edit != before.get(step.index)]
             place = self._pieces.place.T
             self._pieces.hide(np.isin(self._pieces.step, changed) | self._within(windows, *place))
 
@@ -83,7 +82,7 @@ class StepPreview:
         return inside
 
     def _write(self, positions: NDArray[np.float32]) -> None:
-        mesh = ground_mesh.mesh_of(settings.found(self._name))
+        mesh = ground_mesh.mesh_of(settings.resolve(self._name))
         keys = mesh.shape_keys
         shown = keys.key_blocks.get(display_key.DISPLAY_KEY) if keys else None
         if shown is not None:
@@ -94,12 +93,12 @@ class StepPreview:
 
     def _show_playback(self, shown: bool) -> None:
         for name in self._hidden:
-            settings.found(self._name).modifiers[name].show_viewport = shown
+            settings.resolve(self._name).modifiers[name].show_viewport = shown
 
 
 def _windows(
     unedited: Mapping[int, Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
 ) -> list[Window]:
-    """Where the prints of two sets of edits differ."""
-    pairs = ([left.get(n, unedited.get(n)) for left in (before, after)] for n in sorted({*before, *after}))
+    """Windows in which the prints of two sets of edits differ."""
+    pairs = ([prints.get(n, unedited.get(n)) for prints in (before, after)] for n in sorted({*before, *after}))
     return [side.window for pair in pairs if pair[0] is not pair[1] for side in pair if side]

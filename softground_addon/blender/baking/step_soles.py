@@ -46,7 +46,7 @@ def edits_with_soles(
     """
     if edits == {}:
         return {}
-    ground = settings.found(wanted.ground) if wanted.ground else None
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
     on_ground = baked_ground.edits_of(ground, [character.name for character in wanted.characters]) if ground else {}
     edits = on_ground if edits is None else edits
     named = {edit.sole for edit in edits.values() if edit.sole}

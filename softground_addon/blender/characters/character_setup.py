@@ -20,7 +20,7 @@ from ..rigs.frame_ranges import animated_frames
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
-from ..settings import SIDE_TO_CODE, found, is_set_up, name_of, time_stretch_of
+from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, time_stretch_of
 from .import_fixes import is_captured, put_under, size_of, stature_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
@@ -41,7 +41,7 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
 
 
 def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> jobs.Job[SoftGroundCharacter]:
-    """What `add_character` does, in steps; nothing is changed before the last.
+    """Job of `add_character`; nothing is changed before the last.
 
     Where no feet are found its list of soles is empty, for the user to fill.
     """
@@ -58,8 +58,8 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
         )
     rig = name_of(armature)
     recognised = yield from recognise(scene, armature, animated_frames(scene, armature))
-    length = yield from _shortest_sole(scene, found(rig), recognised)
-    armature, mapping = found(rig), recognised.mapping
+    length = yield from _shortest_sole(scene, resolve(rig), recognised)
+    armature, mapping = resolve(rig), recognised.mapping
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
@@ -90,13 +90,13 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     recognised = yield from recognise_body(scene, name)
     assert recognised.body is not None
     if not recognised.mapping.soles:
-        if found(name).type == "MESH":
+        if resolve(name).type == "MESH":
             return None
         nowhere = f"none of them rests on the ground in frames {frames[0]}-{frames[1]}"
-        raise InputError(only_parts(found(name), "they keep one pose" if recognised.body.is_rigid else nowhere))
-    length = yield from _shortest_sole(scene, found(name), recognised)
+        raise InputError(only_parts(resolve(name), "they keep one pose" if recognised.body.is_rigid else nowhere))
+    length = yield from _shortest_sole(scene, resolve(name), recognised)
     character = settings.characters.add()
-    character.name, character.body = name.name, found(name)
+    character.name, character.body = name.name, resolve(name)
     _fill(scene.unit_settings.scale_length, character, recognised.mapping)
     character.mass = recognised.mapping.mass or character.mass
     settings.active_character = len(settings.characters) - 1
@@ -116,7 +116,7 @@ _POSES = 16
 
 
 def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognised: Recognised) -> jobs.Job[float]:
-    """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
+    """Length of a rig's shortest sole [m]; 0 if it is unknown."""
     mapping, recording = recognised.mapping, recognised.recording
     if not mapping.soles:
         return 0.0
@@ -242,7 +242,7 @@ def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping
 
 
 def title_of(character: SoftGroundCharacter) -> str:
-    """What the user calls a character: its armature's name, or that of the prop."""
+    """Name of a character in the interface: its armature's name, or that of the prop."""
     return character.armature.name if character.armature else character.name
 
 

@@ -1,4 +1,4 @@
-"""What an import got wrong is put right above the character, by an empty that it hangs on; its own data stays."""
+"""Corrections of imports by an empty above the character; its own data stays as it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a character prints with: from its skin where it has one, else from the names and the rest pose of its bones."""
+"""Recognition of what a character prints with: from its skin, or from the names and rest pose of its bones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import record
 from ..sampling.skin_sampling import read_skin
-from ..settings import found, name_of
+from ..settings import name_of, resolve
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
@@ -81,7 +81,7 @@ def recognise(
         return Recognised(mapping)
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
     skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature))
-    armature = found(rig)
+    armature = resolve(rig)
     if armature.mode == "EDIT":
         return Recognised(mapping)
     if skin is None:
@@ -95,7 +95,7 @@ def recognise(
     shapes = [shape.key for shape in skin.shapes]
     reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units, shapes=shapes)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    bones = rest_bones(found(rig))
+    bones = rest_bones(resolve(rig))
     weighing = skin_mass.slices(skin, bones, recording.of(np.array([0])))
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
@@ -113,9 +113,9 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     body = yield from jobs.counted(read_body(scene, name), "sample", POSES, share=SHARE / 2)
     if body.is_rigid:
         return Recognised(RigMapping(method="skin"), body=body)
-    first, last = body_frames(scene, found(name))
+    first, last = body_frames(scene, resolve(name))
     samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record_body(scene, name, body, samples, units_about(scene, found(name)))
+    reading = record_body(scene, name, body, samples, units_about(scene, resolve(name)))
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
     mass = yield from jobs.meanwhile(read, weighing)
@@ -125,7 +125,7 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
 
 
 def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
-    """What names and rest pose say, or without a skin the current pose; empty where they say nothing."""
+    """Mapping by names and rest pose, or without a skin by the current pose; empty if none of them gives one."""
     try:
         return map_rig(armature, posed=posed)
     except InputError:

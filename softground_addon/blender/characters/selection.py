@@ -110,7 +110,7 @@ def skin_rig(objects: Objects, armature: bpy.types.Object) -> bpy.types.Object:
 
 
 def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
-    """What an object follows by its constraints and parents, and what those follow."""
+    """Objects that an object follows by constraints and parents, and those that they follow."""
     reached: set[bpy.types.Object] = set()
     waiting = [obj]
     while waiting:

@@ -9,13 +9,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...batch.manifest_values import FRAME_LIMIT
 from ...core.errors import InputError
 from ...core.events.events import Event, as_edited
 from ...core.ground.material import MATERIAL_RANGES, OFF
 from ...core.motion.ground_frame import GroundFrame, in_world, rows
+from ...core.numerics.arrays import Array, Indices
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
@@ -28,12 +28,8 @@ from ..jobs import Job, Progress
 from ..placement import to_world
 from ..plants import trampling_table
 from ..playback import own_data, playback
-from ..settings import SceneUnits, exists, found, name_of
+from ..settings import SceneUnits, exists, name_of, resolve
 from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
 
 LARGEST_UNIT = 1e12
 """Of any of these, and 1 over the smallest: what is beyond is damage."""
@@ -43,7 +39,7 @@ EVENTS = "events"
 
 @dataclass(frozen=True)
 class Place:
-    """Where a bake is to be written. Nothing that the user sees is changed before `publish`.
+    """Place to write a bake to. Nothing that the user sees is changed before `publish`.
 
     Attributes
     ----------
@@ -107,8 +103,8 @@ def on_created(scene: bpy.types.Scene, draft: ObjectName, index: Indices, vertic
     """A ground that is not in the scene yet."""
 
     def publish() -> bpy.types.Object:
-        created_ground.publish(scene, found(draft), surface)
-        return found(draft)
+        created_ground.publish(scene, resolve(draft), surface)
+        return resolve(draft)
 
     return Place(index, vertices[index], draft, publish)
 
@@ -120,8 +116,8 @@ def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices,
         ground_checks.check_playable(detail)
 
     def publish() -> bpy.types.Object:
-        ground_mesh.restore(found(below))
-        return trail_detail.publish(found(below), found(above))
+        ground_mesh.restore(resolve(below))
+        return trail_detail.publish(resolve(below), resolve(above))
 
     return Place(index, vertices[index], above, publish)
 
@@ -131,8 +127,8 @@ def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Plac
     name = name_of(ground)
 
     def publish() -> bpy.types.Object:
-        trail_detail.remove(found(name))
-        return found(name)
+        trail_detail.remove(resolve(name))
+        return resolve(name)
 
     return Place(index, vertices[index], name, publish, is_draft=False)
 
@@ -178,16 +174,16 @@ def write(
     layer : callable, optional
         Gives the depth of the layer at all vertices of the display mesh, where what lies below it shows (V,) [m].
     """
-    found(table)  # or nothing is written
-    ground_checks.check_playable(found(place.display_mesh))
+    resolve(table)  # or nothing is written
+    ground_checks.check_playable(resolve(place.display_mesh))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
-    up = ground_surface.up_of(found(place.display_mesh), unit_scale, frame)
+    up = ground_surface.up_of(resolve(place.display_mesh), unit_scale, frame)
     with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
-        ground_mesh.write(found(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
+        ground_mesh.write(resolve(place.display_mesh), place.index, sample, stored, up, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.95)
-        display_mesh = found(place.display_mesh)
-        playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
+        display_mesh = resolve(place.display_mesh)
+        playback.attach(display_mesh, place.index[spans.point], spans, resolve(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
         ground_mesh.write_shading(display_mesh, own_data.WATER, place.index, water)
         layers = layer(display_mesh)
@@ -198,28 +194,28 @@ def write(
 @contextmanager
 def _as_before_if_it_fails(name: ObjectName) -> Iterator[None]:
     """Give a ground back what it was, with the bake that was on it, where what is done to it fails."""
-    if not ground_mesh.is_baked(found(name)):
+    if not ground_mesh.is_baked(resolve(name)):
         try:
             yield
         except BaseException:
-            ground_mesh.restore(found(name))
+            ground_mesh.restore(resolve(name))
             raise
         return
-    older: Any = ground_mesh.mesh_of(found(name)).copy()
-    played = [(name_of(shown), modifier.node_group) for shown, modifier in playback.playing(found(name))]
+    older: Any = ground_mesh.mesh_of(resolve(name)).copy()
+    played = [(name_of(shown), modifier.node_group) for shown, modifier in playback.playing(resolve(name))]
     for _, group in played:
         group.use_fake_user = True  # or it goes with its last modifier
     try:
         yield
     except BaseException:
-        playback.remove(found(name))
-        newer: Any = ground_mesh.mesh_of(found(name))
+        playback.remove(resolve(name))
+        newer: Any = ground_mesh.mesh_of(resolve(name))
         former = newer.name
         newer.user_remap(older)
         ground_mesh.remove_mesh(newer)
         older.name = former
         for shown, group in played:
-            playback.play(found(shown), group)
+            playback.play(resolve(shown), group)
             group.use_fake_user = False
         raise
     ground_mesh.remove_mesh(older)
@@ -268,8 +264,8 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    left = record_of(ground)
-    return left.shaping, dict(left.about)
+    bake_record = record_of(ground)
+    return bake_record.shaping, dict(bake_record.about)
 
 
 def events_of(ground: bpy.types.Object) -> list[Event]:
@@ -280,11 +276,11 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     InputError
         If there is no bake, or its record has no events.
     """
-    left = record_of(ground)
-    table = left.about.get(EVENTS)
+    bake_record = record_of(ground)
+    table = bake_record.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    inputs, rows_as_edited = left.about["inputs"], as_edited(table, left.steps, left.laid_carves)
+    inputs, rows_as_edited = bake_record.about["inputs"], as_edited(table, bake_record.steps, bake_record.laid_carves)
     return events_in_world(rows_as_edited, frame_in(inputs), ground, inputs["unit_scale_m"])
 
 
@@ -307,11 +303,11 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    return [step for step in record_of(ground).steps if step.left]
+    return [step for step in record_of(ground).steps if step.footprint]
 
 
 def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str, StepEdit]:
-    """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read.
+    """The artist's edits of the steps of a ground's bake, by step id; none if no bake can be read.
 
     `names` are those that its characters have now, if the ids are to have these.
     """

@@ -15,16 +15,15 @@ from ...core.ground.material import GroundMaterial
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
 from ..materials.materials import EDGE, drafted, ensure_material
 from ..mesh_arrays import add_faces
 from ..placement import to_world
-from ..settings import find, found, name_of
+from ..settings import find, name_of, resolve
 from .ground_mesh import discard, mesh_of, write_positions
-
-Array = NDArray[np.float64]
 
 MAX_GRID_VERTICES = 4_000_000
 """Most vertices that a created grid gets; a longer walk gets a coarser mesh (the physics keeps its cells)."""
@@ -39,7 +38,7 @@ BLUR_REACH = 3.0
 
 @dataclass(frozen=True)
 class Layout:
-    """A ground before there is a mesh of it.
+    """Plan of a created ground, before its mesh is made.
 
     Attributes
     ----------
@@ -85,13 +84,13 @@ def soft_edge(margin: float) -> float:
 
 
 def reach_of(material: GroundMaterial) -> float:
-    """How far beyond the soles a material moves the ground [m]."""
+    """Distance beyond the soles to which a material moves the ground [m]."""
     return material.rim_reach + BLUR_REACH * material.blur_sigma
 
 
 @dataclass(frozen=True)
 class CloseUp:
-    """Where a ground is finer than its cells.
+    """Part of a ground whose mesh is finer than its cells.
 
     Attributes
     ----------
@@ -109,7 +108,7 @@ class CloseUp:
 
 
 def _close_up(wanted: BakeSettings, plan: GroundPlan) -> CloseUp | None:
-    """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
+    """Part of a created ground that is finer than its cells, to show relief close up."""
     if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
         return None
     near = np.ones(len(plan.footfalls), bool)
@@ -170,17 +169,17 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
     drafts.callback(_discard_unpublished, name)
     del edges
     yield
-    mesh = mesh_of(found(name))
+    mesh = mesh_of(resolve(name))
     mesh.update()
     mesh.shade_smooth()
     yield
     uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
-    layer = mesh_of(found(name)).uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
+    layer = mesh_of(resolve(name)).uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
     layer.uv.foreach_set("vector", (uv / uv.max())[corner_vertex].ravel())
     yield
     if edge > 0:
         inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
-        fading: Any = mesh_of(found(name)).attributes.new(EDGE, "FLOAT", "POINT")
+        fading: Any = mesh_of(resolve(name)).attributes.new(EDGE, "FLOAT", "POINT")
         fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
     return name
 

@@ -1,4 +1,4 @@
-"""Whether a mesh can be the ground: what keeps it from taking a bake, and what to do about that."""
+"""Checks of a mesh that is to be the ground: faults that prevent a bake, with their remedies."""
 
 from __future__ import annotations
 
@@ -39,8 +39,7 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
 
 
 def hard_fault(obj: bpy.types.Object, ground: bpy.types.Object | None = None) -> str:
-    """What keeps soles from standing on an object as hard ground beside a ground, and the remedy; empty where nothing
-    does."""
+    """Fault that prevents soles from standing on an object as hard ground, and the remedy; empty if there is none."""
     name = obj.name
     if obj.type != "MESH":
         return (

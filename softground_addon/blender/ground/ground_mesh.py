@@ -49,7 +49,7 @@ def has_remains(ground: bpy.types.Object) -> bool:
 
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
-    """What the bake that is on this ground came to, for display; empty if there is none, or something else there."""
+    """Stored summary of the bake on a ground; empty if it has none, or an unreadable one."""
     summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
     values = summary.to_dict() if hasattr(summary, "to_dict") else {}
     numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in values.values())
@@ -62,7 +62,7 @@ def note_warnings(ground: bpy.types.Object, warnings: Sequence[str]) -> None:
 
 
 def warnings_of(ground: bpy.types.Object) -> list[str]:
-    """What the user should know of the bake that is on this ground."""
+    """Stored warnings about the bake on a ground."""
     return str(mesh_of(ground).get(WARNINGS, "")).splitlines() if ground.type == "MESH" else []
 
 

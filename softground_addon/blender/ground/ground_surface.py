@@ -18,6 +18,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.regions import HARD
 from ...core.ground.terrain import MeshTerrain
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
 from .. import ground_slots, mesh_arrays
 from ..compat import remove_scene
@@ -25,9 +26,6 @@ from ..placement import matrix_in
 from ..playback import display_key, playback, weather_modifier
 from . import painted_ground
 from .ground_mesh import mesh_of, rest_positions, users_modifiers, write_positions
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
 """Ways in which an object hangs on a part of its parent, which may lie elsewhere than the parent."""

@@ -46,7 +46,7 @@ def hide(ground: bpy.types.Object) -> None:
 
 
 def _before(ground: bpy.types.Object) -> list[Any]:
-    """What of `_SHOWN` is set of a ground that is shown, or was of one that is hidden."""
+    """Values of `_SHOWN` of a ground; of a hidden one, as they were before."""
     if not hides(ground):
         return [getattr(ground, name) for name in _SHOWN]
     before: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it

@@ -1,22 +1,19 @@
-"""Whether prints on a ground would show: its modifiers work on the ground as the playback has left it."""
+"""Checks that prints show on a ground whose modifiers act after the playback."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array, Indices
 from .. import mesh_arrays
 from ..playback import playback
 from . import ground_mesh, ground_surface
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LIFT = 0.01
 """How far vertices are raised to see what modifiers make of it [m]."""
@@ -90,7 +87,7 @@ def are_undone(
 
 
 def undone_prints(ground: bpy.types.Object) -> Finding:
-    """What to tell the user of such a ground."""
+    """Message about such a ground."""
     if barrier := playback.barrier_on(ground):
         return Finding(
             "blocking_modifier",

@@ -1,4 +1,4 @@
-"""What is painted on a ground: vertex groups or float attributes by which its material is multiplied."""
+"""Painted channels of a ground: vertex groups or float attributes that multiply its material."""
 
 from __future__ import annotations
 

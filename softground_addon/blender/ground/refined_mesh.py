@@ -18,7 +18,7 @@ from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import own_data
-from ..settings import found
+from ..settings import resolve
 
 LAYOUT = {
     "FLOAT": ("value", 1, np.float32),
@@ -97,7 +97,7 @@ class Carried:
 
 
 def read(source: bpy.types.Mesh, groups: Sequence[str] = ()) -> Carried:
-    """What a mesh carries; `groups` are the names of its vertex groups."""
+    """Data of a mesh; `groups` are the names of its vertex groups."""
     coming = [given for given in source.attributes if given.data_type in LAYOUT and _comes_along(given.name)]
     edges, loose = _EMPTY, np.ones(len(source.edges), dtype=bool)
     if len(source.loops):
@@ -177,7 +177,7 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
 
 
 def _mesh_of(name: ObjectName) -> bpy.types.Mesh:
-    return cast("bpy.types.Mesh", found(name).data)
+    return cast("bpy.types.Mesh", resolve(name).data)
 
 
 def _copy_vertex_groups(mesh: bpy.types.Mesh, carried: Carried, surface: Surface, refinement: Refinement) -> None:

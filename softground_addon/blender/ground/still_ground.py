@@ -47,7 +47,7 @@ def changes_with_time(ground: bpy.types.Object) -> str:
 
 
 def changes_shape(obj: bpy.types.Object) -> str:
-    """What gives an object another shape at each frame: its shape keys or a modifier; or an empty text."""
+    """Name of what changes an object's shape over time: its shape keys or a modifier; empty if nothing does."""
     keys = getattr(obj.data, "shape_keys", None)
     moving = keys and keys.animation_data
     if moving and (moving.action or moving.drivers or any(track.strips for track in moving.nla_tracks)):

@@ -1,4 +1,4 @@
-"""What plants need of a bake: the table by which they give way, and how often each vertex was trodden on."""
+"""Data of a bake for plants: the table by which they give way, and how often each vertex was trodden on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where prints show what lies below the layer that they are in: how deep that is at each vertex."""
+"""Depth of the layer at each vertex, for prints that show the ground below it."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ def layers(display_mesh: bpy.types.Object, made_with: BakeSettings) -> Array | N
     Where faces of several materials meet, the least of them. None if it shows nowhere.
     """
     of_slots = {region.slot: region.material.layer_depth if region.material else DEEP for region in made_with.regions}
-    own, mesh = made_with.material.layer_depth, ground_mesh.mesh_of(display_mesh)
+    default, mesh = made_with.material.layer_depth, ground_mesh.mesh_of(display_mesh)
     name = made_with.painted[CHANNELS.index("depth")]
     is_painted = painted_ground.is_there(display_mesh, name)
-    least = min([own, *of_slots.values()])
+    least = min([default, *of_slots.values()])
     if made_with.under == "NEVER" or (made_with.under == "AUTO" and least > THIN and not is_painted):
         return None
-    depth = np.full(len(mesh.vertices), own)
+    depth = np.full(len(mesh.vertices), default)
     if of_slots:
         slots = ground_slots.of_faces(mesh)
-        of_faces = np.full(max([*of_slots, int(slots.max(initial=0))]) + 1, own)
+        of_faces = np.full(max([*of_slots, int(slots.max(initial=0))]) + 1, default)
         of_faces[list(of_slots)] = list(of_slots.values())
         starts, corners = np.empty(len(slots), np.int32), np.empty(len(mesh.loops), np.int32)
         mesh.polygons.foreach_get("loop_start", starts)
@@ -42,7 +42,7 @@ def layers(display_mesh: bpy.types.Object, made_with: BakeSettings) -> Array | N
         count = np.diff(np.append(starts, len(corners)))
         depth[:] = np.inf
         np.minimum.at(depth, corners, np.repeat(of_faces[slots], count))
-        depth[np.isinf(depth)] = own
+        depth[np.isinf(depth)] = default
     if is_painted and (factors := painted_ground.factors(display_mesh, mesh, (name,))) is not None:
         depth *= factors[:, 0]
     if made_with.under == "AUTO":

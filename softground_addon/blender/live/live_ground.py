@@ -16,6 +16,7 @@ from ...core.ground.heightfield import HeightField
 from ...core.ground.sparse_grid import TILE, Window
 from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics import bilinear
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices
 from ...core.record import record
 from ...core.record.footprints import NEVER
@@ -24,8 +25,6 @@ from .. import settings
 from ..ground import ground_mesh, ground_surface
 from ..ground.baked_ground import Place
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Tile = tuple[int, int]
 
 ON_CENTRE = 1e-4
@@ -81,7 +80,7 @@ class LiveGround:
     """
 
     def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> None:
-        ground = settings.found(place.display_mesh)
+        ground = settings.resolve(place.display_mesh)
         self._name = place.display_mesh
         self._vertices, self._place = place.index, place.position[:, :2]
         self._up = ground_surface.up_of(ground, unit_scale, frame)
@@ -93,7 +92,7 @@ class LiveGround:
     def put_on(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> bpy.types.Object:
         """Show a place that has no prints yet; returns the ground."""
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
-        empty, ground = np.empty(0, np.intp), settings.found(place.display_mesh)
+        empty, ground = np.empty(0, np.intp), settings.resolve(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
         up = ground_surface.up_of(ground, unit_scale, frame)
         ground_mesh.write(ground, empty, nothing, no_prints, up, shape_keys=False)

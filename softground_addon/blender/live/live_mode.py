@@ -266,12 +266,12 @@ class LiveMode:
         if made_with.carves and any(map(is_deep, footprints)):
             made_with = replace(made_with, carve=False)  # live mode carves nothing
         yield now
-        vertices = ground_surface.rest_vertices(settings.found(name), made_with.unit_scale_m, made_with.frame)
+        vertices = ground_surface.rest_vertices(settings.resolve(name), made_with.unit_scale_m, made_with.frame)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
         shown = yield from jobs.meanwhile(now, pressing)
         looking = ground_surface.pressed_vertices.slices(vertices, shown.covers, shot.terrain)
         index = yield from jobs.meanwhile(now, looking)
-        place = baked_ground.on_itself(settings.found(name), index, vertices)
+        place = baked_ground.on_itself(settings.resolve(name), index, vertices)
         baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
         throwing = with_debris.slices(baked, ground_of(made_with, shot), made_with, loads)
         baked, debris = yield from jobs.meanwhile(now, throwing)

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
+from ...core.numerics.arrays import Array, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
 from ...core.settings import TIME_LIMIT, BakeSettings
 from .. import settings
@@ -25,9 +25,6 @@ from ..reading import analysis
 from ..reading.shots import Shot, ground_of, settings_of
 from .live_ground import LiveGround
 from .live_mode import LiveMode
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
 
@@ -85,13 +82,13 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
 
     name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
     if vertices is None:  # it was made for the shot
-        vertices = ground_surface.rest_vertices(settings.found(name), unit_scale, frame)
+        vertices = ground_surface.rest_vertices(settings.resolve(name), unit_scale, frame)
     plan = shot.plan or (yield from meanwhile(PLACING, plan_ground.slices(shot.motions)))
     if plan.footfalls is not None:
         footfalls = cells_at(plan.footfalls, cell_size)
         covering = coverage.slices(vertices, slice(None), footfalls, cell_size)
         cover = yield from meanwhile(PLACING, covering)
-        ground = settings.found(name)
+        ground = settings.resolve(name)
 
         def is_under(x: Array, y: Array) -> Mask:
             return among(footfalls, keys_at(np.stack([x, y], axis=-1), cell_size))
@@ -103,12 +100,12 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
             coarse = yield from meanwhile(PLACING, trail_detail.surface_of.slices(ground, unit_scale, frame))
             region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
             refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
-            drafting = trail_detail.draft.slices(drafts, settings.found(name), coarse, refinement)
+            drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement)
             drafted = yield from meanwhile(PLACING, drafting)
             vertices = refinement.at_vertices(coarse, coarse.vertices)
             looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
             index = yield from meanwhile(PLACING, looking)
-            return baked_ground.on_detail(settings.found(name), settings.found(drafted), index, vertices)
+            return baked_ground.on_detail(settings.resolve(name), settings.resolve(drafted), index, vertices)
     looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
     index = yield from meanwhile(PLACING, looking)
-    return baked_ground.on_itself(settings.found(name), index, vertices)
+    return baked_ground.on_itself(settings.resolve(name), index, vertices)

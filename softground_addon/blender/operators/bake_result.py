@@ -140,7 +140,7 @@ def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: s
 
 
 def _button(match: re.Match[str]) -> str:
-    """What a warning calls a button, in the language of the interface."""
+    """Name of a button in a warning, in the language of the interface."""
     return translated("Scale by {factor}", factor=match[1]) if match.lastindex else translated(match[0])
 
 

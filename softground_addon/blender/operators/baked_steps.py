@@ -8,11 +8,11 @@ from functools import cached_property
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.composers.edited_contacts import swapped
 from ...core.errors import InputError
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array
 from ...core.numerics.rigid import rotation
 from ...core.record import record
 from ...core.record.contact_steps import PressingSole, Steps
@@ -21,8 +21,6 @@ from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
 from ..state import state
-
-Array = NDArray[np.float64]
 
 APART = 1.2
 """How far ahead of a step its copy lies, in lengths of its outline."""
@@ -68,12 +66,12 @@ class BakedStep(record.EditableStep):
     @cached_property
     def depth_cm(self) -> float:
         """Depth of the step now [cm]."""
-        return self.left.max_depth_m * 100 if self.left else 0.0
+        return self.footprint.max_depth_m * 100 if self.footprint else 0.0
 
     @property
     def height(self) -> float:
         """Height of the undisturbed ground under it [m]."""
-        return float((self.left or self.baked).position[2])
+        return float((self.footprint or self.baked).position[2])
 
     def outline(self, edit: StepEdit | None = None) -> Array:
         """Its sole on the undisturbed ground, where it is or would be with another edit, (N, 3) [m]."""
@@ -85,7 +83,7 @@ class BakedStep(record.EditableStep):
 
     def ahead(self) -> tuple[float, float]:
         """Place ahead of the step, along world x and y [m]."""
-        along = np.array([np.cos(heading := (self.left or self.baked).heading), np.sin(heading)])
+        along = np.array([np.cos(heading := (self.footprint or self.baked).heading), np.sin(heading)])
         length = float(np.ptp(self.outline()[:, :2] @ along))
         x, y = np.array(self.edit.move_m) + APART * length * along
         return float(x), float(y)
@@ -146,13 +144,14 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
         stored = baked_ground.stored_record(ground)
         key = (baked_ground.display_mesh_of(ground).data.session_uid, bytes(stored[-record.TAIL :]))
         if key not in state.shown_bake:
-            left = record.load(bytes(stored))
-            soles = feet(left.footprints)
+            loaded = record.load(bytes(stored))
+            soles = feet(loaded.footprints)
             steps = [
-                BakedStep(**vars(step), number=number, feet=soles) for number, step in enumerate(left.steps, start=1)
+                BakedStep(**vars(step), number=number, feet=soles) for number, step in enumerate(loaded.steps, start=1)
             ]
-            reach, frame = baked_ground.baked_with(left.about, "rim_reach"), baked_ground.frame_in(left.about["inputs"])
-            state.shown_bake = {key: ShownBake(steps, left.edited, reach, frame)}
+            about = loaded.about
+            reach, frame = baked_ground.baked_with(about, "rim_reach"), baked_ground.frame_in(about["inputs"])
+            state.shown_bake = {key: ShownBake(steps, loaded.edited, reach, frame)}
     except InputError:
         return NOTHING
     shown: ShownBake = state.shown_bake[key]

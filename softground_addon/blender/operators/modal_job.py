@@ -320,7 +320,7 @@ def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
 
 
 def _parts_of_bodies(options: Any) -> list[bpy.types.Object]:
-    """What bodies without an armature are made of; to find it, Blender goes through all objects of the file."""
+    """Parts of bodies without an armature; to find them, Blender goes through all objects of the file."""
     return [part for character in options.characters if character.body for part in character.body.children_recursive]
 
 

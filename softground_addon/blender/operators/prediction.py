@@ -63,7 +63,7 @@ class DepthPrediction:
 
 
 def of(scene: bpy.types.Scene) -> DepthPrediction | None:
-    """The prediction for a scene whose shot is known; to be shown, and worked out soon where it is outdated."""
+    """The prediction for a scene whose shot is known; to be shown; an outdated one is computed again soon."""
     return _look(scene)[1]
 
 

@@ -13,7 +13,7 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import ground_presets, jobs, kept, session, settings
+from .. import ground_presets, jobs, reuse, session, settings
 from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
@@ -86,7 +86,7 @@ def _add(
     for name in [settings.name_of(obj) for obj in (*rigs, *filter(deforms, props))]:
         is_rig = name not in remaining
         adding = character_setup.adding_character if is_rig else character_setup.adding_body
-        character = yield from adding(scene, settings.found(name))
+        character = yield from adding(scene, settings.resolve(name))
         if character is None:  # it prints as a prop
             continue
         remaining = [prop for prop in remaining if prop != name]
@@ -98,7 +98,7 @@ def _add(
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
         else:
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
-    props = [settings.found(prop) for prop in remaining]
+    props = [settings.resolve(prop) for prop in remaining]
     added = prop_setup.add_props(scene, props) if props else []
     if added:
         each = [translated("'{name}' of {mass} kg", name=entry.name, mass=f"{entry.mass:g}") for entry in added]
@@ -173,7 +173,7 @@ class SOFTGROUND_OT_create_ground(Reading):
         with ExitStack() as drafts:
             creating = created_ground.created(drafts, wanted, plan)
             name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
-            ground = settings.found(name)
+            ground = settings.resolve(name)
             with analysis.own_changes(scene):
                 created_ground.publish(scene, ground, wanted.surface)
         created_ground.select(scene, ground)
@@ -261,7 +261,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        kept.forget()
+        reuse.forget()
         with analysis.own_changes(scene):
             if ground is not None:
                 if baked_ground.has_remains(ground):

@@ -82,7 +82,7 @@ def _viewport(area: Any) -> Any:
 
 def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[BakedStep]:
     """The last step that is in the ground at a frame, and those next to it."""
-    visible = [step for step in baked_steps.of(ground) if step.left and step.there_from <= frame]
+    visible = [step for step in baked_steps.of(ground) if step.footprint and step.there_from <= frame]
     if not visible:
         return []
     last = max(visible, key=lambda step: step.there_from)
@@ -103,7 +103,7 @@ def _show(prints: Sequence[BakedStep], area: Any, unit_scale: float) -> None:
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     width = np.ptp(prints[0].outline()[:, :2], axis=0).min()
     reach = min(float(np.linalg.norm(points - middle, axis=1).max()), LONGEST * float(width))
-    look = (prints[0].left or prints[0].baked).heading + ASIDE
+    look = (prints[0].footprint or prints[0].baked).heading + ASIDE
     metre = 1.0 / unit_scale
     view, distance = space.region_3d, DISTANCE * reach * metre * space.lens / 50.0
     at = _in_view(middle)

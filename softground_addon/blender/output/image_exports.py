@@ -17,6 +17,7 @@ from ...core.errors import InputError
 from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
 from ...core.motion.ground_frame import GroundFrame
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
@@ -27,9 +28,6 @@ from ..debris import debris_object
 from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
 from .exports import baked_display_mesh, written_by_blender
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 DISPLACEMENT, MASK, WEATHER, DEBRIS = "displacement", "mask", "weather", "debris"
 """Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,

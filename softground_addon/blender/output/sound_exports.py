@@ -48,7 +48,7 @@ def write(
     """
     rate = settings.frame_rate_of(scene)
     table = baked_ground.events_of(ground)
-    footprints = {step.name: step.left for step in baked_ground.steps_of(ground) if step.left}
+    footprints = {step.name: step.footprint for step in baked_ground.steps_of(ground) if step.footprint}
     recordings = _recordings(samples, path) if samples else []
     steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
     if stereo:

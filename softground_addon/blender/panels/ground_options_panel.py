@@ -217,7 +217,7 @@ DURATIONS = {"seconds": "{count} seconds", "minutes": "{count} minutes", "hours"
 
 
 def rounded(value: float) -> float:
-    """A positive number to two digits, at least 1, as estimates are told."""
+    """A positive number to two digits, at least 1, for estimates."""
     return max(1.0, float(f"{value:.2g}"))
 
 

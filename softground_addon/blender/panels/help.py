@@ -113,7 +113,7 @@ _UNSAID = ("file", "tread_image", "shoe_treads")
 
 
 def _pages() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """What Blender asks for when *Online Manual* is chosen on a button: where the manual is, and its pages."""
+    """Address of the manual and its pages, for *Online Manual* in the menu of a button."""
     return MANUAL.as_uri() + "/", PAGES if MANUAL.is_dir() else ()
 
 

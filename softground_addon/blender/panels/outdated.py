@@ -1,4 +1,4 @@
-"""Outdated bakes, as the panel shows them; worked out after `draw`, never in it."""
+"""Outdated bakes, as the panel shows them; computed after `draw`, never in it."""
 
 from __future__ import annotations
 

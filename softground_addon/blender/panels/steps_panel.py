@@ -65,7 +65,7 @@ def _list(layout: Any, steps: Any, chosen: list[BakedStep]) -> None:
 def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
     """A step as one button: number, side, frames, depth, force."""
     first, last = step.frames
-    nothing = translated("muted") if step.edit.mute else "" if step.left else translated("nothing left")
+    nothing = translated("muted") if step.edit.mute else "" if step.footprint else translated("nothing left")
     depth = nothing or f"{step.depth_cm:.1f} cm"
     text = f"{step.number} {step.side or step.baked.sole}   {first}-{last}   {depth}   {step.baked.peak_force_n:,.0f} N"
     icon = "DUPLICATE" if step.is_copy else "MODIFIER" if step.is_edited else "BLANK1"

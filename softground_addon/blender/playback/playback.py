@@ -16,7 +16,7 @@ from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
 from ..node_modifiers import modifier_with
-from ..settings import find, found, name_of
+from ..settings import find, name_of, resolve
 from . import own_data
 from . import playback_nodes as nodes
 
@@ -39,7 +39,7 @@ def keyframe_tables(lines: PlaybackCurves, position: NDArray[np.float32]) -> Ite
     name = name_of(_table_object(lines, position))
     del lines, position  # they are large, and all is in the table
     try:
-        yield found(name)
+        yield resolve(name)
     finally:
         if (table := find(name)) is not None and not table.users:
             _remove_table(table)

@@ -176,10 +176,10 @@ class CourseNodes:
             vectors.append(graph.vector("MULTIPLY_ADD", excess, (1.0, 1.0, 0.0), seeped))
         return self._keep(*(graph.number(vector) for vector in vectors))
 
-    def between(self, left: Number) -> Number:
+    def between(self, remaining: Number) -> Number:
         """Place of a share of soaking among those for which there are sums."""
         low, high = self._soaking
-        return ((left - low) * (1.0 / max(high - low, LEAST_RANGE))).within_one()
+        return ((remaining - low) * (1.0 / max(high - low, LEAST_RANGE))).within_one()
 
     def hollows(self, index: Any) -> list[Number]:
         """Excess at the low and the high share of soaking, and share that has seeped in, of a row."""
@@ -293,17 +293,17 @@ class CourseNodes:
         return self.graph.combined(*(number.socket if isinstance(number, Number) else number for number in numbers))
 
     def _keep(self, *vectors: Number) -> list[Any]:
-        """Vectors as the rows keep them, all worked out together."""
+        """Vectors as the rows keep them, all computed together."""
         self.rows, captured = self.graph.captured(self.rows, *vectors, kind="VECTOR")
         return [vector.socket for vector in captured]
 
-    def _depth(self, left: Number, settling: Number, since: Number) -> Number:
+    def _depth(self, remaining: Number, settling: Number, since: Number) -> Number:
         """Depth of the snow of each row [kg/m²] that settles within it, and from its end on."""
         first, second, third = (
             self.graph.number(weight) / w.settled_density(since + settling * (1.0 - at), self._density)
             for at, weight in GAUSS
         )
-        return left * (first + second + third)
+        return remaining * (first + second + third)
 
     def _hollows(self, soaking: w.Soaking, rained: Number, falling: Any, time: Number) -> list[Number]:
         """Rain that has not soaked in at either share, and time, from each row on to now."""

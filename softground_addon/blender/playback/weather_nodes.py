@@ -291,12 +291,12 @@ class _Vertices:
         level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
         return level - (1.0 - level.above(0.0)) * ENDLESS
 
-    def _thawed(self, left: Number) -> Number:
-        """What has melted of snow of which so much would be left without [m]."""
+    def _thawed(self, remaining: Number) -> Number:
+        """Melted depth of snow, at most the depth that would remain without thaw [m]."""
         graph, depth = self._graph, self._matter.snow_depth
         ratio = (1.0 - graph.number(graph.attribute(COMPACTED)) * (1.0 / depth)).at_least(0.0)
-        around = self._course.around["thawed"].at_most(left)
-        within = (self._number(self._course.aged["thawed"], self._moment) * ratio * ratio).at_most(left)
+        around = self._course.around["thawed"].at_most(remaining)
+        within = (self._number(self._course.aged["thawed"], self._moment) * ratio * ratio).at_most(remaining)
         return around + (within - around) * self._dot(
             self._trodden, self._not_full(self._inside), self._moment_if_begun
         )

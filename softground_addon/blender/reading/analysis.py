@@ -1,4 +1,4 @@
-"""What is known of a shot before it is baked: its loads on the ground and the depth to expect.
+"""Analysis of a shot before it is baked: its loads on the ground and the predicted depth.
 
 A shot is read when the user asks for something that needs it, and kept while Blender runs, outside the file. It counts
 as known until what it was read from changes; what the add-on itself writes leaves it known.
@@ -138,7 +138,7 @@ def read(scene: bpy.types.Scene) -> Analysis:
 
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
-    """What `read` does, in steps."""
+    """Job of `read`."""
     analysis = yield from refreshing(scene)
     if analysis is None:
         wanted = settings_of(scene)
@@ -152,7 +152,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
 
 @contextmanager
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
-    """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
+    """Context of changes that leave the shot as it was read: prints, response, a ground made to fit it."""
     if scene.session_uid in state.analyses:
         _tell_of_changes(scene.view_layers)  # of what others have changed until now, while it still counts
     analysis = known(scene)
@@ -180,7 +180,7 @@ def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = Non
 
 
 def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> jobs.Job[float | None]:
-    """What `expected_depth` does, in steps. The scene is asked for nothing after the first."""
+    """Job of `expected_depth`. The scene is asked for nothing after the first."""
     wanted = settings.snapshot(scene)
     analysis = yield from refreshing(scene)
     if analysis is None:
@@ -237,26 +237,26 @@ def _keep(
 
 
 def _hash_of(scene: bpy.types.Scene) -> str:
-    """What a shot is read from, as far as it is not seen in the settings."""
+    """Hash of the inputs of reading a shot that are not in the settings."""
     wanted = settings.snapshot(scene)
     return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
 
 
 def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
-    """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
+    """Inputs of reading a shot that are in the settings; a handler notices other edits."""
     return _parts(wanted)[0], ground and wanted.ground and _place(ground)
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
-    """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers;
-    nothing of one that moves, which is told by hash."""
+    """World matrix of the ground, without evaluating the scene, which would call the handlers; empty for a ground that
+    moves, which is compared by hash."""
     if mover_of(ground):
         return []
     return [tuple(row) for row in ground_surface.placed_by_parents(ground) or ground.matrix_world]
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
-    """What the loads depend on, and the contacts: whatever acts on the prints but what a prediction is asked about."""
+    """Settings that loads and contacts depend on: all that act on prints, but for those that a prediction varies."""
     landing = any(character.force_model == "IMPULSE" or character.armature is None for character in wanted.characters)
     return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
 

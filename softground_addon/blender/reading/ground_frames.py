@@ -40,8 +40,8 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
     ground, bodies = np.eye(4), list(_bodies(wanted))
     direction = felt_gravity(wanted.gravity_direction, bodies)
     if wanted.ground:
-        ground = world_matrix(settings.found(wanted.ground))
-        if mover_of(settings.found(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
+        ground = world_matrix(settings.resolve(wanted.ground))
+        if mover_of(settings.resolve(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
             return replace(wanted, frame=frame)
     elif bodies:
         place = world_matrix(bodies[0])[:3, 3] * wanted.unit_scale_m
@@ -57,7 +57,7 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
 def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFrame | None:
     """The frame of the settings' ground, which something moves; None where that keeps it still."""
     assert wanted.ground
-    ground, scale = settings.found(wanted.ground), wanted.unit_scale_m
+    ground, scale = settings.resolve(wanted.ground), wanted.unit_scale_m
     name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
@@ -96,7 +96,7 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     path = np.linalg.inv(in_units)
     place = path[0] @ matrices[0]
     frame = GroundFrame(rows(place), True, float(frames[0]), path, ride())
-    return replace(frame, riding=_riding(scene, ground, place))
+    return replace(frame, riding=_riding(scene.objects, ground, place))
 
 
 def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: SceneUnits) -> jobs.Job[Array]:
@@ -106,15 +106,15 @@ def _path(scene: bpy.types.Scene, obj: bpy.types.Object, frames: range, units: S
     return recording.props[name].copy()
 
 
-def _riding(scene: bpy.types.Scene, ground: bpy.types.Object, place: Array) -> dict[str, Array]:
+def _riding(objects: settings.Objects, ground: bpy.types.Object, place: Array) -> dict[str, Array]:
     """Space of each mesh that the same object moves, to the frame in which the ground's own is at some place (4, 4)."""
     to_frame, mover = place @ np.linalg.inv(world_matrix(ground)), mover_of(ground)
-    riders = (obj for obj in scene.objects if obj.type == "MESH" and obj != ground and mover_of(obj) == mover)
+    riders = (obj for obj in objects if obj.type == "MESH" and obj != ground and mover_of(obj) == mover)
     return {obj.name_full: to_frame @ world_matrix(obj) for obj in riders}
 
 
 def _bodies(wanted: BakeSettings) -> Iterator[bpy.types.Object]:
     for character in wanted.characters:
         if owner := character.armature or character.body:
-            yield settings.found(owner)
+            yield settings.resolve(owner)
         yield from (object_named(sole.object) for sole in character.soles if sole.object)

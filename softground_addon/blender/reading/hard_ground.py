@@ -7,7 +7,6 @@ from contextlib import suppress
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.findings import Finding, listed
@@ -16,6 +15,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.raised_rests import RaisedRest, carried_by, raised_rests, reach_of
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from .. import settings
@@ -23,8 +23,6 @@ from ..ground import ground_checks, ground_surface
 from ..ground.baked_ground import display_mesh_of
 from ..placement import matrix_in
 from . import staleness
-
-Array = NDArray[np.float64]
 
 
 @sliced
@@ -69,7 +67,7 @@ def _tops(
     """The upper sides of objects within bounds in the plane, of those that have any."""
     tops = []
     for name in names:
-        surface = ground_surface.undisturbed_surface(settings.found(name), wanted.unit_scale_m, frame=wanted.frame)
+        surface = ground_surface.undisturbed_surface(settings.resolve(name), wanted.unit_scale_m, frame=wanted.frame)
         yield
         with suppress(InputError):  # nobody walks there
             tops.append((name, (yield from ground_surface.terrain_of.slices(surface, bounds))))
@@ -80,8 +78,8 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     """The meshes that a scene shows where soles rest, and that do not move."""
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
-    ground = settings.found(wanted.ground) if wanted.ground else None
-    known = {settings.found(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
+    known = {settings.resolve(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
     known |= {ground, display_mesh_of(ground)} if ground else set()
     still = []
     for obj in scene.objects:
@@ -98,7 +96,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
 
 
 def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:
-    """What to say of an object that carries soles and is not in the settings."""
+    """Finding about an object that carries soles and is not in the settings."""
     who, first = listed(dict.fromkeys(rest.character for rest in rests)), min(rest.frame for rest in rests)
     count = f"{len(rests)} steps of {who} stand" if len(rests) > 1 else f"1 step of {who} stands"
     return Finding(

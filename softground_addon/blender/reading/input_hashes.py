@@ -61,7 +61,7 @@ def of_topology(mesh: bpy.types.Mesh) -> str:
 
 
 def of_positions(mesh: bpy.types.Mesh) -> str:
-    """Where the vertices of a mesh are without any bake."""
+    """Hash of the positions of a mesh without any bake."""
     rest = ground_mesh.rest_positions(mesh) + np.float32(0)  # Edit Mode makes negative zeros positive
     return f"{zlib.crc32(rest.data):08x}"
 
@@ -80,7 +80,7 @@ def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
 
 
 def of_shapes(obj: bpy.types.Object) -> str:
-    """What shapes a skin beside bones: its shape keys and modifiers; empty without any."""
+    """Hash of the deformers of a skin other than bones: shape keys and modifiers; empty without any."""
     texts = [text for modifier in obj.modifiers if modifier.type != "ARMATURE" for text in of_settings(modifier)]
     keys = obj.data.shape_keys
     if keys is not None:
@@ -107,7 +107,7 @@ def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
 
 
 def of_place(objects: Iterable[bpy.types.Object]) -> str:
-    """Where objects stand in their parents, but for what their own animation decides."""
+    """Hash of where objects stand in their parents, but for channels that their own animation sets."""
     values = []
     for obj in objects:
         animated = animated_paths(obj)
@@ -139,7 +139,7 @@ def of_keys(obj: bpy.types.Object | bpy.types.Key) -> str:
 
 
 def of_animation(obj: bpy.types.Object, known: Known) -> str:
-    """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones.
+    """Hash of what moves an object: curves, strips, drivers, constraints, physics and bones.
 
     Of data-blocks that it follows, `known` has what they hold, as far as it was looked at; they are added.
     """
@@ -169,7 +169,7 @@ def of_animation(obj: bpy.types.Object, known: Known) -> str:
 
 
 def of_settings(owner: Any, animated: Collection[str] = (), known: Known | None = None) -> Iterator[str]:
-    """What is set in a modifier, a constraint or the like, but for what is animated; each Blender has settings more.
+    """Settings of a modifier, a constraint or the like, but for those that are animated.
 
     Data-blocks that it names are compared by what they hold; `known` has that of some.
     """
@@ -213,7 +213,7 @@ def _plain(value: Any, known: Known) -> str:
 
 
 def _of_block(block: bpy.types.ID, known: Known) -> str:
-    """What a data-block is, whatever its name."""
+    """Content of a data-block, whatever its name."""
     if block not in known:
         known[block] = ""  # groups may hold each other
         if isinstance(block, bpy.types.Object):
@@ -282,7 +282,7 @@ def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
 
 
 def _of_driver(curve: bpy.types.FCurve, known: Known) -> Iterator[str]:
-    """What a driver computes, and the custom properties that it reads."""
+    """Expression of a driver, and the custom properties that it reads."""
     driver: Any = curve.driver
     yield f"{curve.data_path} {curve.array_index} {curve.mute} {driver.type} {driver.expression}"
     yield from _of_curves([curve])

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.carving.responded_skin import WornSkin
 from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
@@ -26,6 +25,7 @@ from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
+from ...core.numerics.arrays import Array
 from ...core.rig.mapping import RigMapping
 from ...core.settings import TIME_LIMIT, BakeSettings
 from ...core.weather.felt_weather import weathering_of
@@ -35,8 +35,8 @@ from ..characters.import_fixes import size_of
 from ..ground import ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
-from ..kept import kept
 from ..response.character_keys import ReadRig, controls_of
+from ..reuse import reused
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
 from ..sampling.control_poses import RigPoses
@@ -45,8 +45,6 @@ from ..sampling.rig_checks import check_rig
 from ..sampling.rig_sampling import sample_character, sample_prop
 from ..weather import ground_weather as weather
 from . import ground_frames, hard_ground
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -90,12 +88,12 @@ class Shot:
 
     @property
     def variation(self) -> PaintedSurface | None:
-        """How the ground varies from place to place, where it is painted."""
+        """Variation of the ground from place to place, if it is painted."""
         painted, ground = self.surface is not None and self.surface.factors is not None, soft_ground(self.terrain)
         return PaintedSurface(ground) if painted and isinstance(ground, MeshTerrain) else None
 
     def regions(self, wanted: BakeSettings) -> Regions | None:
-        """Where the ground is made of something else than the rest."""
+        """Regions of the ground with other materials."""
         ground = soft_ground(self.terrain)
         if self.surface is None or self.surface.kinds is None or not isinstance(ground, MeshTerrain):
             return None
@@ -128,10 +126,10 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
             "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
             "Character."
         )
-    ground = settings.found(wanted.ground) if wanted.ground else None
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
     for printing in wanted.characters:
         if printing.armature:
-            require_armature(settings.found(printing.armature))
+            require_armature(settings.resolve(printing.armature))
         check_props(scene.objects, printing.name, printing.soles, ground)
     start, end = wanted.frames
     if end <= start:
@@ -145,13 +143,13 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 "the same one."
             )
     for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.found(name), ground):
+        if fault := ground_checks.hard_fault(settings.resolve(name), ground):
             raise InputError(fault)
     return ground_frames.framed(scene, wanted)
 
 
 def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
-    """What the scene's characters do below a layer, and the ground that they do it on.
+    """Motions of the scene's characters below a response layer, and their ground.
 
     Raises
     ------
@@ -166,7 +164,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
         terrain, missing = yield from _with_hard(scene, wanted, motions, plan.terrain, np.stack([lower, upper]))
         return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
     yield Progress("sample", 1.0)
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
     of_slots = wanted.kinds[1]
     looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
@@ -176,7 +174,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
     binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    soft = yield from kept(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
+    soft = yield from reused(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
     hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
     terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing), wanted.frame)
@@ -240,7 +238,7 @@ def sample_characters(
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
         job: Generator[int | None, None, CharacterMotion]
         if character.armature:
-            armature = settings.found(character.armature)
+            armature = settings.resolve(character.armature)
             if wanted.response:
                 check_rig(scene.objects, armature, mapping, character.mass_kg)
                 controls = controls_of(scene.view_layers[0], armature, mapping)

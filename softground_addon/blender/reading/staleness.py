@@ -1,4 +1,4 @@
-"""Whether a bake still fits what it was made from: the settings, the ground's mesh, the animation. By hash."""
+"""Comparison of a bake with its inputs, by hash: the settings, the ground's mesh, the animation."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
 
 
 def stamp_of(ground: bpy.types.Object) -> str:
-    """What is noted with a ground's bake of what it was made from; empty where nothing is."""
+    """Stamp stored with a ground's bake: hashes of its inputs; empty if there is none."""
     return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(FINGERPRINTS, ""))
 
 
@@ -86,7 +86,7 @@ def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], so
 
 
 def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: BakeSettings) -> tuple[str, ...]:
-    """What has changed since the bake on a ground, for the user to read; nothing where there is none.
+    """Changes since the bake on a ground, as texts for the user; none without a bake.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: 
     deletion = _deletion_of(ground)
     if deletion or wanted.ground is None:
         return deletion
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
@@ -155,14 +155,14 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
 def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and the
     hard objects that bear them."""
-    ground = settings.found(wanted.ground) if wanted.ground else None
+    ground = settings.resolve(wanted.ground) if wanted.ground else None
     movers = [obj for character in wanted.characters for obj in movers_of(character)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{character.name}": _of_body(objects, character) for character in wanted.characters},
-        **{f"{HARD}:{name.name}": _of_hard(settings.found(name)) for name in wanted.hard_grounds},
+        **{f"{HARD}:{name.name}": _of_hard(settings.resolve(name)) for name in wanted.hard_grounds},
     }
 
 
@@ -189,7 +189,7 @@ def of_ground(wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the ground of a shot is read from, the same with and without a bake on it; none without ground."""
     if wanted.ground is None:
         return {}
-    ground = settings.found(wanted.ground)
+    ground = settings.resolve(wanted.ground)
     return {GROUND: _of_ground(ground), SURFACE: _of_surface(ground, wanted.painted)}
 
 
@@ -230,7 +230,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 
 
 def _of_standing(ground: bpy.types.Object) -> str:
-    """Where the ground is, told without having Blender evaluate anything: it calls the handlers, which ask this."""
+    """Hash of the place of the ground, without evaluating the scene: that calls the handlers, which ask this."""
     matrix = ground_surface.placed_by_parents(ground)
     if matrix is None or mover_of(ground):
         return f"{input_hashes.of_place([ground, *ancestors(ground)])}{_of_movement(ground, None)}"
@@ -250,7 +250,7 @@ def _modifiers_of(ground: bpy.types.Object) -> list[str]:
 
 
 def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
-    """What the ground's modifiers do, and how its material varies."""
+    """Hash of the ground's modifiers, and of the variation of its material."""
     keyed = input_hashes.animated_paths_of(ground)
     parts = [
         text for modifier in ground_mesh.users_modifiers(ground) for text in input_hashes.of_settings(modifier, keyed)
@@ -267,7 +267,7 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
 
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
-    """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
+    """Hash of what moves an object besides its keys and its parents: its rig, and all that it follows."""
     parents = ancestors(mover)
     known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
     # All of these are compared by themselves: here it counts only which is followed.
@@ -289,7 +289,7 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
 def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
     """The armature, or the body with its meshes, and the objects of a character."""
     owner = character.armature or character.body
-    owners = [settings.found(owner)] if owner else []
+    owners = [settings.resolve(owner)] if owner else []
     parts = [part for part in _worn_by_body(character) if part not in owners]
     return [*owners, *parts, *_things_of(character)]
 
@@ -300,11 +300,11 @@ def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
 
 
 def _worn_by(objects: settings.Objects, character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_on(objects, settings.found(character.armature)) if character.armature else _worn_by_body(character)
+    return meshes_on(objects, settings.resolve(character.armature)) if character.armature else _worn_by_body(character)
 
 
 def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
-    return meshes_of(settings.found(character.body)) if character.body else []
+    return meshes_of(settings.resolve(character.body)) if character.body else []
 
 
 def bodies_of(objects: settings.Objects, wanted: BakeSettings) -> list[bpy.types.Object]:
@@ -325,7 +325,7 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
         for worn in _worn_by(objects, character)
     ]
     if character.armature:
-        rigs = worn_rigs(objects, settings.found(character.armature))
+        rigs = worn_rigs(objects, settings.resolve(character.armature))
         parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 

@@ -19,7 +19,7 @@ from ...core.settings import ObjectName
 from ..animation_layer.layer_curves import LayerCurve, path_of_bone
 from ..sampling.control_poses import RigPoses
 from ..sampling.rig_checks import check_bones
-from ..settings import found
+from ..settings import resolve
 from .rig_controls import BODY, Control, find_controls
 
 ANGLE_TOLERANCE = np.radians(0.04)
@@ -68,7 +68,9 @@ def response_curves(
     curves: list[LayerCurve] = []
     for done, control in enumerate(rig.controls):
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
-            curves += _bone_curves(found(armature), control, rig.poses, moved, motion.frames * stretch, metre, accuracy)
+            curves += _bone_curves(
+                resolve(armature), control, rig.poses, moved, motion.frames * stretch, metre, accuracy
+            )
         yield done + 1
     return curves
 

@@ -47,7 +47,7 @@ class Layer:
 
 def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
     """Characters that can respond to the ground, with their armatures: props without a rig cannot."""
-    return [(each, settings.found(each.armature)) for each in characters if each.armature]
+    return [(each, settings.resolve(each.armature)) for each in characters if each.armature]
 
 
 def check_characters(characters: Iterable[CharacterSettings]) -> None:

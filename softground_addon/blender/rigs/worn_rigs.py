@@ -7,13 +7,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
 
-Array = NDArray[np.float64]
 Lead = tuple[bpy.types.Object, str]
 """An armature and a bone of it that others follow."""
 
@@ -58,7 +57,7 @@ def _leads(body: bpy.types.Object, rig: bpy.types.Object) -> dict[Lead, str]:
 
 
 def _followed(bone: bpy.types.PoseBone) -> Iterator[tuple[str, Lead]]:
-    """What a bone follows in the world, by constraints that count."""
+    """Targets that a bone follows in the world, by constraints that count."""
     for constraint in bone.constraints:
         if constraint.mute or constraint.influence < _FULL or is_own(constraint):
             continue
@@ -70,7 +69,7 @@ def _followed(bone: bpy.types.PoseBone) -> Iterator[tuple[str, Lead]]:
 
 
 def _held(bone: bpy.types.PoseBone, leads: Collection[Lead]) -> tuple[str, Lead] | None:
-    """By what kind of constraint a bone goes where one of the leads goes."""
+    """Kind of the constraint by which a bone follows one of the leads."""
     return next((held for held in _followed(bone) if held[0] in _HOLDS and held[1] in leads), None)
 
 

@@ -23,7 +23,7 @@ from ..placement import units_about, world_matrix
 from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import parts_of
-from ..settings import found
+from ..settings import resolve
 from .rig_checks import check_frames, check_mass
 from .sampling_scene import object_named, sampling_scene, still_there
 from .skin_sampling import mesh_of
@@ -74,7 +74,7 @@ def read_body(
     InputError
         If its meshes cannot be read, or are other ones from frame to frame.
     """
-    body = found(name)
+    body = resolve(name)
     for mesh in meshes_of(body):
         check_libraries(mesh)
         if mesh.mode == "EDIT":
@@ -92,7 +92,7 @@ def record_body(
     scene: bpy.types.Scene, name: ObjectName, body: BareBody, frames: range, units: SceneUnits
 ) -> Generator[int, None, Recording]:
     """Poses of the parts of a body over time; yields the number of frames read, and raises as `read_body` does."""
-    objects = [mesh.name_full for mesh in meshes_of(found(name))]
+    objects = [mesh.name_full for mesh in meshes_of(resolve(name))]
     positions, counts, _ = yield from _positions(scene, objects, frames, body.followed, units.frame)
     if sum(counts) != len(body.skin.vertices):
         raise InputError(f"The meshes of '{name.name}' were changed while they were read: try again.")

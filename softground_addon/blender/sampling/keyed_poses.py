@@ -57,7 +57,7 @@ def with_parents(armature: bpy.types.Object, bones: Iterable[str]) -> list[str]:
 
 
 def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDArray[Any]) -> Array:
-    """Where a bone is over time.
+    """Transforms of a bone over time.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
 
 
 def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
-    """Where such an armature is itself over time, (F, 4, 4) [Blender units]."""
+    """World matrices of such an armature over time, (F, 4, 4) [Blender units]."""
     return _transforms(armature, "", times)
 
 
@@ -127,7 +127,7 @@ def _curves(animation: bpy.types.AnimData) -> list[bpy.types.FCurve]:
 
 
 def _from_parent(bone: bpy.types.Bone) -> Array:
-    """From the bone's space to its parent's, at rest."""
+    """Matrix from the bone's space to its parent's, at rest."""
     matrix = np.array(bone.matrix.to_4x4())
     matrix[:3, 3] = bone.head
     matrix[1, 3] += bone.parent.length  # heads count from the parent's tail
@@ -135,7 +135,7 @@ def _from_parent(bone: bpy.types.Bone) -> Array:
 
 
 def _transforms(obj: bpy.types.Object | bpy.types.PoseBone, path: str, times: Array) -> Array:
-    """What the channels of an object or a bone come to over time, (F, 4, 4).
+    """Matrices from the channels of an object or a bone over time, (F, 4, 4).
 
     The object's curves have its channels at `path`; those that no curve animates stay as they are.
     """

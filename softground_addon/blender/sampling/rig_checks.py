@@ -1,4 +1,4 @@
-"""What must hold of a rig before it is read, and of the poses that were read: errors with their remedies."""
+"""Checks of a rig before it is read, and of the poses that were read: errors with their remedies."""
 
 from __future__ import annotations
 

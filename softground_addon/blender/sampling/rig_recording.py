@@ -33,7 +33,7 @@ def record(
     below: LayerKind = LayerKind.RESPONSE,
     findings: list[Finding] | None = None,
 ) -> Generator[int, None, Recording]:
-    """Where some bones of a rig and some objects are over time, and what values some shape keys of objects have.
+    """Transforms over time of bones and objects, and values of shape keys.
 
     Yields the number of frames read.
 
@@ -59,7 +59,7 @@ def record_props(
     *,
     findings: list[Finding] | None = None,
 ) -> Generator[int, None, Recording]:
-    """Where some objects are over time; `name` is what the user calls them together.
+    """Transforms of objects over time; `name` is their common name in errors.
 
     Yields the number of frames read.
 
@@ -133,7 +133,7 @@ def _evaluate(
     simulated = any(is_simulated(object_named(obj)) for obj in props)
     source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, props, shapes, handled=handled)
     with source as name:
-        for frame in _simulated_before(scene, frames.start) if simulated else ():
+        for frame in _simulated_before(scene.rigidbody_world, frames.start) if simulated else ():
             with handlers_silent():
                 still_there(name).frame_set(frame)
             yield 0
@@ -211,11 +211,10 @@ def _moved_by_handlers(
     return False
 
 
-def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
+def _simulated_before(world: bpy.types.RigidBodyWorld | None, first: int) -> range:
     """Frames to step through before the first one.
 
     Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
     cache.
     """
-    world = scene.rigidbody_world
     return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)

@@ -1,4 +1,4 @@
-"""What a rig does over a range of frames, as a `CharacterMotion`; the user's scene is only read.
+"""Sampling of a rig over a range of frames into a `CharacterMotion`; the user's scene is only read.
 
 A rig that nothing but its keys moves is not evaluated at all. Others are, in a temporary scene that depends on nothing
 else: constraints, drivers, NLA, parents and object motion act as in the user's scene, its meshes cost nothing, and the
@@ -24,10 +24,10 @@ from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import LONGEST, skin_stances
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
-from ..kept import kept
 from ..placement import units_about
+from ..reuse import reused
 from ..rigs.rig_mapping import rest_bones
-from ..settings import found, name_of
+from ..settings import name_of, resolve
 from .control_poses import RigPoses
 from .prop_extraction import check_props, read_prop
 from .rig_checks import check_frames, check_mass, check_recording, check_rig
@@ -98,7 +98,7 @@ def sample_character(
     rig, skin = name_of(armature), None
     if on_bones and meshes_on(scene.objects, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
-        armature = found(rig)
+        armature = resolve(rig)
     units = units or units_about(scene, armature)
     bones += skin.bones if skin and len(frames) <= LONGEST else ()
     shapes = [shape.key for shape in skin.shapes] if skin else []
@@ -106,8 +106,8 @@ def sample_character(
     if poses:
         poses.take(recording)
         if poses.with_skin and skin and {*skin.bones} <= {*recording.bones}:
-            poses.skin = WornSkin(rig.name, skin, rest_bones(found(rig)), mapping, recording)
-    return (yield from recorded_motion(scene, found(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
+            poses.skin = WornSkin(rig.name, skin, rest_bones(resolve(rig)), mapping, recording)
+    return (yield from recorded_motion(scene, resolve(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
 
 
 def recorded_motion(
@@ -137,7 +137,7 @@ def recorded_motion(
         if source.object
     }
     read = name, bones, mapping, recording, skin, mass, skin_mass, carried
-    return (yield from kept(len(recording.frames), "motion", read, _motion(*read), of=name))
+    return (yield from reused(len(recording.frames), "motion", read, _motion(*read), of=name))
 
 
 def _motion(

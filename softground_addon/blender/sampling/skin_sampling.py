@@ -17,7 +17,7 @@ from .. import mesh_arrays
 from ..placement import beside
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
-from ..settings import ObjectName, Objects, found, name_of
+from ..settings import ObjectName, Objects, name_of, resolve
 from .seen_mesh import as_seen, left_out
 
 _SLICE = 2_000
@@ -44,7 +44,7 @@ def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[st
 
 
 def left_out_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
-    """What shapes the meshes on some bones and is not read, by the name of the mesh."""
+    """Deformers of the meshes on some bones that are not read, by the name of the mesh."""
     on_bones = (obj for obj in meshes_on(objects, armature) if _is_on(obj, bones))
     return {obj.name: names for obj in on_bones if (names := left_out(obj))}
 
@@ -87,19 +87,19 @@ def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | 
     rigs = [armature, *worn_rigs(objects, armature)]
     worn = [(obj, next(rig for rig in rigs if _wears(rig, obj))) for obj in meshes_on(objects, armature)]
     for name, rig in [(name_of(obj), name_of(rig)) for obj, rig in worn]:
-        obj, armature = found(name), found(rig)
+        obj, armature = resolve(name), resolve(rig)
         if obj.mode == "EDIT":
             raise InputError(f"'{obj.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first.")
         check_libraries(obj)
         with as_seen(obj) as (seen, shapes):
-            if not len(mesh_of(found(seen)).polygons):
+            if not len(mesh_of(resolve(seen)).polygons):
                 continue
             if _hangs(obj, armature):
-                pieces.append(_hung(found(seen), armature, shapes))
+                pieces.append(_hung(resolve(seen), armature, shapes))
             else:
                 pieces.append((yield from _deformed(seen, shapes, name, rig)))
         if rig != body:
-            pieces[-1] = _carried(pieces[-1], found(rig), found(body))
+            pieces[-1] = _carried(pieces[-1], resolve(rig), resolve(body))
         yield
     if not pieces:
         return None
@@ -201,7 +201,7 @@ def _carried(piece: _Piece, rig: bpy.types.Object, body: bpy.types.Object) -> _P
 def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, rig: ObjectName) -> Slices[_Piece]:
     """A mesh of that name where the object `placed` is."""
     vertex, group, weight = yield from _weights(name)
-    obj, armature = found(name), found(rig)
+    obj, armature = resolve(name), resolve(rig)
     mesh, bones = mesh_of(obj), armature.data.bones
     count = len(mesh.vertices)
     names = tuple(group.name for group in obj.vertex_groups)
@@ -212,7 +212,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
     used, group = np.unique(group, return_inverse=True)
     total = np.bincount(vertex, weight, count)
     held = total[vertex] > _LEAST_WEIGHT
-    to_armature = beside(found(placed), armature)
+    to_armature = beside(resolve(placed), armature)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
         mesh_arrays.triangles(mesh),
@@ -227,7 +227,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
 def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
     """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
     read, tables = 0, [np.empty((0, 3))]
-    while read < len(vertices := mesh_of(found(name)).vertices):
+    while read < len(vertices := mesh_of(resolve(name)).vertices):
         piece = enumerate(vertices[read : read + _SLICE], read)
         entries = [x for index, vertex in piece for each in vertex.groups for x in (index, each.group, each.weight)]
         tables.append(np.array(entries, dtype=float).reshape(-1, 3))

@@ -10,9 +10,10 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
+from ...core.record.footprints import Footprint
 from .. import jobs, session, settings
 from ..live import live
 from ..operators import baked_steps, prediction
@@ -24,7 +25,6 @@ from ..state import state
 from . import overlay_shapes
 from .overlay_shapes import Cells, Outline
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
 
 SIDES: dict[str, Colour] = {"L": (0.25, 0.6, 1.0, 1.0), "R": (1.0, 0.35, 0.3, 1.0), "": (0.9, 0.8, 0.3, 1.0)}
@@ -92,19 +92,24 @@ def draw_shapes() -> None:
 def draw_pressed() -> None:
     """Draw the prints that a bake has pressed so far, until the ground shows them; for the viewport's draw handler."""
     context: Any = bpy.context
-    if state.pressing is None:
+    pressing = state.pressing
+    if pressing is None or pressing.scene != context.scene.name:
         return
     import gpu  # noqa: PLC0415
 
-    shapes, metre = state.pressing.shapes, 1.0 / context.scene.unit_settings.scale_length
-    for pressed in state.pressing.footprints[len(shapes) :]:
-        cells = overlay_shapes.touched(pressed)
-        shapes.append(_triangles(overlay_shapes.squares(cells, pressed.cell_size, state.pressing.terrain) * metre))
+    for footprint in pressing.footprints[len(pressing.shapes) :]:
+        pressing.shapes.append(_triangles(corners_of(footprint, pressing, context.scene)))
     if context.space_data.overlay.show_overlays:
         gpu.state.blend_set("ALPHA")
-        for triangles in shapes:
+        for triangles in pressing.shapes:
             _draw(triangles, PRESSED)
         gpu.state.blend_set("NONE")
+
+
+def corners_of(footprint: Footprint, pressing: session.Pressing, scene: bpy.types.Scene) -> Array:
+    """Triangles over the cells that a print touches, (6·N, 3), where they are in the scene [Blender units]."""
+    squares = overlay_shapes.squares(overlay_shapes.touched(footprint), footprint.cell_size, pressing.terrain)
+    return in_scene(squares, scene, pressing.frame)
 
 
 def draw_numbers() -> None:

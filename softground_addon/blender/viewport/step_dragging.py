@@ -11,9 +11,9 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.errors import SoftGroundError
+from ...core.numerics.arrays import Array
 from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
 from ..baking import step_edits
@@ -26,8 +26,6 @@ from ..state import state
 from ..translation import translated
 from . import overlay
 from .step_editing import EditJob, OnSteps, changed, toggle
-
-Array = NDArray[np.float64]
 
 TURN_STEP = 5.0
 """How far the mouse wheel turns a step that is dragged [deg]."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
@@ -26,8 +27,6 @@ from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
 from . import weather_keys
-
-Array = NDArray[np.float64]
 
 READING = jobs.Progress("sample", 0.5)
 
@@ -45,18 +44,18 @@ PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
 of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
-def add(ground: bpy.types.Object, left: BakeRecord | None = None) -> Any:
+def add(ground: bpy.types.Object, record: BakeRecord | None = None) -> Any:
     """Put weather on a ground with a bake, or renew what there is, at once; the modifier. See `adding`."""
-    return jobs.run(adding(ground, left))
+    return jobs.run(adding(ground, record))
 
 
-def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str = "") -> jobs.Job[Any]:
+def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: str = "") -> jobs.Job[Any]:
     """Put weather on a ground with a bake, or renew what there is, in the last step; the modifier.
 
     Parameters
     ----------
-    left : BakeRecord, optional
-        What its bake left, where that need not be read.
+    record : BakeRecord, optional
+        Record of the bake, if it is at hand; otherwise read from the ground.
     preset : str, optional
         One of `PRESETS` to set it to.
 
@@ -67,9 +66,9 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
     """
     name = settings.name_of(ground)
     _check_names(baked_ground.display_mesh_of(ground))
-    footprints, about = (left.shaping, left.about) if left else baked_ground.load(ground)
+    footprints, about = (record.shaping, record.about) if record else baked_ground.load(ground)
     places = yield from _places(ground, footprints, about)
-    ground = settings.found(name)
+    ground = settings.resolve(name)
     display_mesh = baked_ground.display_mesh_of(ground)
     existing: Any = weather_modifier.modifier_of(display_mesh)
     if existing:
@@ -88,17 +87,17 @@ def adding(ground: bpy.types.Object, left: BakeRecord | None = None, preset: str
 
 
 def values_of(ground: bpy.types.Object) -> dict[str, float]:
-    """What the sliders of a ground's weather are at; nothing where there is none."""
+    """Slider values of a ground's weather; empty if it has none."""
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
     return {} if modifier is None else weather_keys.values_of(modifier)
 
 
-def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
-    """Fit weather to what a new bake left, with the values that the ground had before it; nothing if it had none."""
+def renew(ground: bpy.types.Object, values: Mapping[str, float], record: BakeRecord) -> None:
+    """Fit weather to the record of a new bake, with the values that the ground had before it, if it had weather."""
     existing = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
     if existing is None and not values:
         return
-    modifier = add(ground, left)
+    modifier = add(ground, record)
     if existing is None:
         _set(modifier, values)
 
@@ -171,7 +170,7 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
 
 
 def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], Matter]:
-    """What `weather_places` takes of a bake, and how its ground takes weather.
+    """Input of `weather_places` from a bake, and the weather properties of its ground.
 
     By its footprints and what its record says about it; raises what `units_of` and `baked_with` of `baked_ground` do
     for damage.
@@ -182,7 +181,7 @@ def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[
     material["layer_depth"] *= baked_ground.baked_with(about, "densest") or 1.0  # how far it can be pressed
     known = {
         "cell_size": baked_ground.unit_of(inputs, "cell_size_m"),
-        "time_stretch": baked_ground.unit_of(inputs, "time_stretch"),
+        "time_stretch": baked_ground.units_of(inputs).time_stretch,
         "felt": felt_in(inputs) is not None,
         "puddles": matter.soaking is not None,
         **material,
@@ -191,14 +190,14 @@ def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[
 
 
 def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mapping[str, Any]) -> jobs.Job[WeatherPlaces]:
-    """What weather needs to know of the vertices."""
+    """Places of the vertices, for weather."""
     display_mesh = baked_ground.display_mesh_of(ground)
     with damage_named(ground):
         (known, _), unit_scale = of_bake(footprints, about), baked_ground.unit_of(about["inputs"], "unit_scale_m")
     name, frame = settings.name_of(display_mesh), baked_ground.frame_in(about["inputs"])
     position = ground_surface.undisturbed_surface(display_mesh, unit_scale, frame=frame).vertices
     yield READING
-    display_mesh = settings.found(name)
+    display_mesh = settings.resolve(name)
     mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale, frame)
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
     relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)

@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.numerics.arrays import Array
 from ...core.playback.keyframe_tables import keyframe_tables
 from ...core.playback.vertex_histories import VertexHistories
 from ...core.weather.weather_places import NOT_YET, SIGMAS, weather_places
@@ -21,8 +21,6 @@ from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from . import ground_weather as weather
 from . import weather_keys
-
-Array = NDArray[np.float64]
 
 BLUR = SIGMAS[-1]
 """Standard deviation over which a print acts on what weather makes of the ground around [m]."""

@@ -69,7 +69,7 @@ def taken_up(film: Any, carried: CarriedFilm) -> Any:
 
     Examples
     --------
-    >>> taken_up(np.array([0.0, 2.0, 4.0]), CarriedFilm("mud", most=4.0, taken=2.0, left=0.2, water=0.3))
+    >>> taken_up(np.array([0.0, 2.0, 4.0]), CarriedFilm("mud", most=4.0, taken=2.0, deposited=0.2, water=0.3))
     array([2., 3., 4.])
     """
     return np.minimum(film + carried.taken * (1.0 - film / carried.most), carried.most)
@@ -85,7 +85,7 @@ def share_left(pressure: Any, carried: CarriedFilm, slid: float = 0.0) -> Any:
     slid : float
         Distance that the sole slides, in sole lengths: from 1 on it leaves twice as much.
     """
-    return np.minimum(carried.left * -np.expm1(-np.asarray(pressure) / PRESSING) * (1.0 + min(slid, 1.0)), 1.0)
+    return np.minimum(carried.deposited * -np.expm1(-np.asarray(pressure) / PRESSING) * (1.0 + min(slid, 1.0)), 1.0)
 
 
 def carry(

@@ -82,7 +82,7 @@ class FloorSteps:
         """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
         density = surfaces.sticking(self.kind).density
         for step in steps:
-            if step.left is None or step.is_copy or (step.left.character, step.left.sole) != sole.of:
+            if step.footprint is None or step.is_copy or (step.footprint.character, step.footprint.sole) != sole.of:
                 continue
-            if (step.left.surface or self.ground) == self.kind and step.left.end_frame < sole.last_frame:
-                yield Meeting(step.left.end_frame, shed=shed.get(step.index, 0.0) * density)
+            if (step.footprint.surface or self.ground) == self.kind and step.footprint.end_frame < sole.last_frame:
+                yield Meeting(step.footprint.end_frame, shed=shed.get(step.index, 0.0) * density)

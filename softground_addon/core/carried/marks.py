@@ -130,8 +130,8 @@ def marks_of(
     """
     if not isinstance(terrain, HardOnSoft):
         return None
-    prints = [step.left or step.baked for step in steps]
-    kinds = dict.fromkeys([surface, *(print_.surface for print_ in prints if print_.surface), *terrain.wet])
+    prints = [step.footprint or step.baked for step in steps]
+    kinds = dict.fromkeys([surface, *(footprint.surface for footprint in prints if footprint.surface), *terrain.wet])
     sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
@@ -179,7 +179,7 @@ def _of_kind(
         dirty = sole.dirty if kind.name == ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = FloorSteps(kind.name, ground, tuple(soles))
-    at_most, _ = floors.films([replace(step, left=step.baked) for step in steps if not step.is_copy], {})
+    at_most, _ = floors.films([replace(step, footprint=step.baked) for step in steps if not step.is_copy], {})
     weighs = [bool((at_most[n][part["zone"]] * part["share"]).any()) for n, part in enumerate(parts)]
     numbers = np.append(np.where(weighs, np.cumsum(weighs) - 1, -1), -1).astype(int)
     soles = [replace(sole, marks=tuple(numbers[list(sole.marks)].tolist())) for sole in soles]

@@ -54,7 +54,7 @@ def with_carves(
     surface : str
         What it is made of.
     """
-    prints = {step.index: _as_the_body_steps(step) for step in left.steps if step.left is not None}
+    prints = {step.index: _as_the_body_steps(step) for step in left.steps if step.footprint is not None}
     waders = {print.character for print in prints.values() if is_deep(print)}
     responded = [
         (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
@@ -70,8 +70,8 @@ def with_carves(
 
 def _as_the_body_steps(step: EditableStep) -> Footprint:
     """The print of a step that is left, when its body takes the step, which follows no edit of its time."""
-    assert step.left is not None
-    at = shifted(step.left, -step.edit.shift_frames) if step.edit.shift_frames else step.left
+    assert step.footprint is not None
+    at = shifted(step.footprint, -step.edit.shift_frames) if step.edit.shift_frames else step.footprint
     return at if at.pressed_by else replace(at, pressed_by=step.baked.pressed_by)
 
 

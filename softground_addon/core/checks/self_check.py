@@ -53,7 +53,7 @@ MANY_AT_BOTTOM = 0.25
 def self_check(
     loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], terrain: Terrain, cell_size: float, ground: str
 ) -> Slices[list[Finding]]:
-    """What is wrong with a bake, or may be.
+    """Findings about a bake that is wrong, or may be.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def self_check(
 
 
 def no_motion(motion: CharacterMotion) -> Finding | None:
-    """What to say of a character that stands still."""
+    """Finding about a character that stands still."""
     if motion.centre is not None or not motion.stands_still:
         return None
     remedy = "check that its action has keys in them, is assigned with its slot, and is not muted."
@@ -253,7 +253,7 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
 
 
 def bottomed_out(footprints: Sequence[Footprint], material: GroundMaterial, ground: str) -> list[Finding]:
-    """What to say where steps end at the bottom of the layer, whose floors are then flat."""
+    """Finding about steps that end at the bottom of the layer, whose floors are then flat."""
     count = sum(footprint.max_depth_m > (1.0 - AT_BOTTOM) * material.deepest for footprint in footprints)
     if not count or count < MANY_AT_BOTTOM * len(footprints):
         return []

@@ -113,7 +113,7 @@ def _stands_level(motion: CharacterMotion, steps: Sequence[Footprint], terrain: 
 
 @dataclass(frozen=True)
 class _Touching:
-    """Where skin rests on the ground."""
+    """Contacts of the skin with the ground."""
 
     skin: LowSkin
     on: Mask

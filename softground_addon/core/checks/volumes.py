@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import BakeError
 from ..ground.soft_ground import SoftGround
+from ..numerics.arrays import Array
 from ..record.footprints import QUANTUM, Footprint
-
-Array = NDArray[np.float64]
 
 RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (docs/model.md section 4)."""

@@ -110,7 +110,7 @@ class EditedSteps:
 
     @sliced
     def pressed_again(self, edits: Mapping[int, StepEdit]) -> Slices[dict[int, Footprint | None]]:
-        """What stands for some of the footprints.
+        """Footprints in place of some of the baked ones.
 
         Parameters
         ----------

@@ -25,7 +25,7 @@ NEWEST = 48
 
 @dataclass(frozen=True)
 class _Change:
-    """What one frame did to the ground.
+    """Change of the ground by one frame.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Playhead:
         return max(first, self.frame - NEWEST, np.floor(min(began, default=first)) - 1.0)
 
     def changed_since(self, frame: float) -> list[Window]:
-        """Where the ground that is shown may differ from what it was at a scene frame."""
+        """Windows in which the shown ground may differ from the ground at a scene frame."""
         shown = self._changes[: self._shown + 1]
         return [window for change in shown if change.frame > frame for window in change.windows]
 
@@ -160,7 +160,7 @@ class Playhead:
         return self._changes[self._shown].contact
 
     def loads_by_now(self) -> list[CharacterLoads]:
-        """What has pressed the ground that is shown."""
+        """Loads that have pressed the ground that is shown."""
         return [_until(self.frame, character) for character in self._loads]
 
     def _taken_over(self, result: FrameResult) -> _Change:
@@ -182,7 +182,7 @@ class Playhead:
         return tuple(earlier)
 
     def press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
-        """What loads do to the ground as it was before, frame by frame."""
+        """Press loads into the ground as it was before, frame by frame."""
         return Simulation(self._soft_ground, self._before.copy(), self.undisturbed).run(loads)
 
 

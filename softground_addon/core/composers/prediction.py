@@ -18,6 +18,7 @@ from ..ground.heightfield import HeightField
 from ..ground.material import MATERIAL_RANGES, GroundMaterial, Pressure
 from ..ground.soft_ground import SoftGround
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..pressing.contact_layout import STEPS_AT_ONCE as STEPS_AHEAD
 from ..pressing.contact_layout import ContactLayout
@@ -27,8 +28,6 @@ from ..pressing.solver import GroundSolver
 from ..record.footprints import Footprint
 from ..record.typical_depth import main_contacts, median_depth, typical_contacts
 from .simulation import ShotContact, contacts_of, time_grid
-
-Array = NDArray[np.float64]
 
 CELLS_ALONG_SOLE = 60
 """Finer cells show the same depths, to a hundredth."""
@@ -173,7 +172,7 @@ def _sampled(contacts: Sequence[_Contact], ground: SoftGround) -> Slices[ShotCon
 
 
 def _middle(ordered: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """As many of the ordered numbers from their middle, or one more."""
+    """The middle `count` of the ordered numbers, or one more."""
     beside = max(0, (len(ordered) - count) // 2)
     return ordered[beside : len(ordered) - beside]
 

@@ -6,7 +6,6 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..checks.volumes import check_volumes
 from ..errors import InputError
@@ -17,6 +16,7 @@ from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
 from ..loads.estimate import CharacterLoads
 from ..motion.motion import CharacterMotion, shortest_sole
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
@@ -28,23 +28,21 @@ from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, resp
 from .shot_loads import loads_of_shot
 from .simulation import simulate
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class PressedShot:
-    """What a shot leaves.
+    """Loads, record and responses of a shot.
 
     Attributes
     ----------
-    left : BakeRecord
+    record : BakeRecord
         Its steps, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
     """
 
     loads: list[CharacterLoads]
-    left: BakeRecord
+    record: BakeRecord
     forces: dict[str, object] | None
     responses: list[CharacterResponse]
 
@@ -82,7 +80,7 @@ def press_shot(
     factors : (V, 3) float array, optional
         What is painted on the ground.
     seen : list of Footprint, optional
-        Takes each print once its contact ends, for who looks on; where bodies lean, once more in each pass.
+        Takes each print as soon as its contact ends, for a preview; where bodies lean, that of the first pass.
 
     Yields
     ------
@@ -102,20 +100,20 @@ def press_shot(
     footprints, forces = yield from _simulate(wanted, loads, ground, seen)
     before = None
     for _ in range(LEAN_PASSES):
-        left = yield from _edited(wanted, ground, footprints, edits)
+        record = yield from _edited(wanted, ground, footprints, edits)
         yield None
-        now = yield from leaning.slices(loads, standing, terrain, left.edited, asked)
+        now = yield from leaning.slices(loads, standing, terrain, record.edited, asked)
         if not leans_anew(now, before):
             break
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground, seen)
+        footprints, forces = yield from _simulate(wanted, loads, ground)
     check_volumes(footprints, ground, factors)
     yield None
-    left = yield from _edited(wanted, ground, footprints, edits)
-    responses = yield from responses_of.slices(loads, motions, terrain, left, asked)
-    return PressedShot(loads, left, forces, responses)
+    record = yield from _edited(wanted, ground, footprints, edits)
+    responses = yield from responses_of.slices(loads, motions, terrain, record, asked)
+    return PressedShot(loads, record, forces, responses)
 
 
 def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
@@ -131,12 +129,12 @@ def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground
 def _edited(
     wanted: BakeSettings, ground: SoftGround, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
 ) -> Slices[BakeRecord]:
-    left = BakeRecord(footprints, {})
-    return (yield from with_edits.slices(left, edits, ground, wanted.cell_size_m)) if edits else left
+    record = BakeRecord(footprints, {})
+    return (yield from with_edits.slices(record, edits, ground, wanted.cell_size_m)) if edits else record
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None
+    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None = None
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
@@ -182,8 +180,8 @@ def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
     }
 
 
-def edit_findings(left: BakeRecord) -> list[Finding]:
-    """Which of the artist's edits have lost their step."""
+def edit_findings(record: BakeRecord) -> list[Finding]:
+    """Findings about edits of the artist that have lost their step."""
     steps = [
         Finding(
             "edit_without_step",
@@ -191,16 +189,16 @@ def edit_findings(left: BakeRecord) -> list[Finding]:
             f"Step '{name}', which you edited, no longer exists: its foot does not touch the ground at that frame.",
             "The edit is kept for when the step comes back; Reset All Steps drops it.",
         )
-        for name in without_step(left.footprints, left.edits)
+        for name in without_step(record.footprints, record.edits)
     ]
     soles = [
         Finding(
             "edit_without_sole",
             "warning",
             f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the "
-            f"sole '{left.edits[name].sole}' of its edit.",
+            f"sole '{record.edits[name].sole}' of its edit.",
             "The edit is kept for when that foot or mesh is there; choose another sole, or reset the step.",
         )
-        for name in without_sole(left.footprints, left.edits)
+        for name in without_sole(record.footprints, record.edits)
     ]
     return steps + soles

@@ -87,8 +87,8 @@ def _toes_apart(outline: Array) -> float:
     crosses = (x <= lines[:, None]) != (next_x <= lines[:, None])
     along = (lines[:, None] - x) / np.where(next_x == x, 1.0, next_x - x)
     ends = np.sort(np.where(crosses, y + along * (next_y - y), np.inf), axis=1)
-    back, left = ends[:, 2::2], ends[:, 1:-1:2]
-    gaps = np.where(np.isfinite(back), back, 0.0) - np.where(np.isfinite(back), left, 0.0)
+    reentry, leaving = ends[:, 2::2], ends[:, 1:-1:2]
+    gaps = np.where(np.isfinite(reentry), reentry, 0.0) - np.where(np.isfinite(reentry), leaving, 0.0)
     return 0.5 * float(np.mean((gaps > GAP * length).any(axis=1)))
 
 

@@ -122,7 +122,7 @@ class ReplayedStep:
         return window, last.reshape(shape), touched.reshape(shape)
 
     def _sum(self, during: Sequence[slice]) -> Array:
-        """What it changed in some of its recorded frames, (2, rows, columns) [m]."""
+        """Sum of its changes in some of its recorded frames, (2, rows, columns) [m]."""
         window = self._footprint.window
         sums = []
         for part, (_, first, cells, amounts) in zip(during, self._changes, strict=True):

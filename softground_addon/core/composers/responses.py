@@ -210,7 +210,7 @@ def worst_gaps(responses: Sequence[CharacterResponse]) -> list[dict[str, object]
 
 
 def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
-    """What the user should know about the responses."""
+    """Findings about the responses."""
     without_legs = [
         Finding(
             "no_legs",

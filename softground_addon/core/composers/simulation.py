@@ -1,4 +1,4 @@
-"""From a character's motion to its loads, and from loads to footprints in the ground."""
+"""Simulation of loads from a character's motion, and of footprints from loads."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ class ShotContact:
     pressing: PressingSole | None
 
     def recorded(self, steps: Steps) -> ContactSteps | None:
-        """What its footprint keeps of its steps."""
+        """Record of its steps for its footprint."""
         return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
     def layout(self, frames: Array, stride: int = 1) -> ContactLayout:

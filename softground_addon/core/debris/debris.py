@@ -95,7 +95,7 @@ class Debris:
 
 @dataclass(frozen=True)
 class Source:
-    """What throws at a step as the artist left it, and how much [m³]."""
+    """Source of debris at a step after the artist's edits, with its volume [m³]."""
 
     throw: Throw
     step: EditableStep
@@ -141,15 +141,15 @@ def sources(
     count, of_all = sum(not step.is_copy for step in steps), []
     for step in steps:
         yield
-        if step.left is None:
+        if step.footprint is None:
             continue
         ways = [
-            throw_of_step.placed(step.baked, step.left, step.edit)
+            throw_of_step.placed(step.baked, step.footprint, step.edit)
             for throw_of_step in of_steps.get(step.index % count, ())
         ]
-        matter = surfaces.find(step.left.surface or surface).thrown
-        volumes = [_volume(way, step.left, matter, gravity) for way in ways]
-        scale = min(1.0, step.left.rim_m3 / max(sum(volumes), 1e-300))
+        matter = surfaces.find(step.footprint.surface or surface).thrown
+        volumes = [_volume(way, step.footprint, matter, gravity) for way in ways]
+        scale = min(1.0, step.footprint.rim_m3 / max(sum(volumes), 1e-300))
         of_all += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
     return of_all
 
@@ -196,7 +196,7 @@ def throw(
     kinds = 2 * sum(source.throw.kind != ThrowKind.SHED for source in throwing)  # pieces and grains
     parts = []
     for source in throwing:
-        footprint = source.step.left
+        footprint = source.step.footprint
         matter = surfaces.find((footprint and footprint.surface) or surface).thrown
         parts.append(_pieces(source, matter, gravity, ALL_PIECES // max(kinds, 1)))
         yield
@@ -283,7 +283,7 @@ def _radii(volume: float, sizes: tuple[float, float], most: int, random: np.rand
 
 def _corona(source: Source, random: np.random.Generator, count: int, gravity: float) -> tuple[Array, Array]:
     """Start and speed of the ring around a landing."""
-    throw, footprint = source.throw, source.step.left
+    throw, footprint = source.throw, source.step.footprint
     assert footprint is not None
     radius = _radius(throw, footprint)
     (((middle,),), ((along,),)) = throw.followed()

@@ -12,11 +12,10 @@ from ..events.phases import Phase
 from ..ground import surfaces
 from ..ground.surfaces import ThrownMatter
 from ..loads.estimate import CharacterLoads
+from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.throws import Throw, ThrowKind
-
-Array = NDArray[np.float64]
 
 PUSHING = 0.25
 """Time before a sole leaves in which it pushes off [s]."""
@@ -41,12 +40,12 @@ LANDING_TIME = 0.1
 
 @sliced
 def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], *, surface: str) -> Slices[list[Throw]]:
-    """How the steps of a bake throw.
+    """Throws of the steps of a bake.
 
     Parameters
     ----------
     footprints : sequence of Footprint
-        That they left.
+        Prints of the loads.
     """
     throws: list[Throw] = []
     for character in loads:

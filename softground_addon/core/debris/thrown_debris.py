@@ -30,7 +30,7 @@ def thrown(
     gravity: float,
     loads: Sequence[CharacterLoads] | None = None,
 ) -> Slices[tuple[BakeRecord, Debris | None]]:
-    """What the steps of a record throw as the artist leaves them, and the record with it booked; None if nothing may.
+    """Debris of a record's steps after the artist's edits, and the record with it booked; None if nothing may throw.
 
     Parameters
     ----------

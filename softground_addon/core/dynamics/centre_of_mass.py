@@ -193,7 +193,7 @@ def trunk_spin(motion: CharacterMotion) -> Array:
 
 
 def _half_across(joints: _Joints, joint: str, step: float) -> tuple[Array, Array]:
-    """From the middle between two joints to the left one on the level, and how fast that changes, (2, N) each."""
+    """Horizontal vector from the middle of two joints to the left one, and its rate of change, (2, N) each."""
     across = (joints[f"{joint}_l"] - joints[f"{joint}_r"])[:, :2].T / 2
     return across, np.gradient(across, step, axis=1)
 

@@ -104,7 +104,7 @@ def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) ->
 
 
 def _offset(samples: Array, frame: int, other: int) -> Array:
-    """What is to be added to the samples near `other` so that they go on from `frame`; poses only move, not turn."""
+    """Offset of the samples near `other` so that they go on from `frame`; poses only move, not turn."""
     offset = samples[frame] - samples[other]
     if samples.ndim == 4:  # poses (F, P, 4, 4)
         offset[..., :3, :3] = 0.0

@@ -99,7 +99,7 @@ def as_edited(
     for row in table:
         if row["step"] in of_steps:
             of_steps[row["step"]].append(row)
-    rows += [_moved(row, step) for step in steps if step.left for row in of_steps[step_id(step.baked)]]
+    rows += [_moved(row, step) for step in steps if step.footprint for row in of_steps[step_id(step.baked)]]
     if carves:
         of_left = {row["step"]: row for row in reversed(rows)}
         wading = ((of_left.get(step.name), step, carves.get(step.index)) for step in steps)
@@ -196,7 +196,7 @@ def _row(
 
 def _moved(row: Event, step: EditableStep) -> Event:
     """An event of a step as edited."""
-    before, after = step.baked, step.left
+    before, after = step.baked, step.footprint
     assert after is not None
     if step.thrown:
         row = row | {"thrown_kg": _rounded(step.thrown.get(row["phase"], 0.0) * surfaces.find(row["surface"]).density)}
@@ -222,7 +222,7 @@ def _is_cut(carve: Footprint) -> bool:
 
 
 def _wade(row: Event, step: EditableStep, carve: Footprint) -> Event:
-    """What a leg cuts out of deep ground beside its print, by an event of the step."""
+    """Event of a leg that carves deep ground beside its print, from the event of the step."""
     changes, cell = carve.compression, carve.cell_size
     cut = np.maximum(np.add.reduceat(changes.amounts.astype(float), changes.first[:-1]), 0.0).cumsum()
     start, end = changes.frames[np.searchsorted(cut, np.array(MOST_OF_A_CUT) * cut[-1])]

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ..loads.contacts import REST_SPEED
 from ..loads.estimate import CharacterLoads
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array
 from ..numerics.intervals import runs
-
-Array = NDArray[np.float64]
 
 Kind = Literal["heel_strike", "foot_flat", "heel_off", "toe_off", "slide_start", "slide_end", "scuff", "land", "wade"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

@@ -13,15 +13,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground import surfaces
 from ..ground.surfaces import Voice
+from ..numerics.arrays import Array
 from ..record.footprints import QUANTUM, Footprint
 from .events import LANDINGS, Event
 from .wave_file import RATE
-
-Array = NDArray[np.float64]
 
 ADULT_WEIGHT = 700.0
 """Peak force that sounds as loud as `LOUDNESS` [N]."""
@@ -206,7 +204,7 @@ def step_sound(step: SoundStep) -> tuple[int, Array]:
 
 
 def voice_of(surface: str) -> Voice:
-    """How a surface sounds, or a hard floor."""
+    """Voice of a surface, or of a hard floor."""
     return surfaces.HARD_VOICE if surface == surfaces.HARD else surfaces.find(surface).voice
 
 

@@ -76,7 +76,7 @@ def build(
     """
     rows = [_step(step) for step in steps]
     counted = [row for row in rows if not row.get("left_out")]
-    shown = [step.left for step in steps if step.left]
+    shown = [step.footprint for step in steps if step.footprint]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
@@ -128,7 +128,7 @@ def _carved(carves: Iterable[Footprint]) -> dict[str, dict[str, float]]:
 
 def _step(editable: EditableStep) -> dict[str, Any]:
     """Entry of a step, as it lies on the ground; as it was baked if nothing of it does."""
-    footprint = editable.left or editable.baked
+    footprint = editable.footprint or editable.baked
     step: dict[str, Any] = {
         "id": editable.name,
         "contact": footprint.sole,
@@ -146,7 +146,7 @@ def _step(editable: EditableStep) -> dict[str, Any]:
         step["surface"] = footprint.surface
     if editable.edit != UNCHANGED or editable.is_copy:
         step["edit"] = edit_as_json(editable.edit)
-    if editable.left is None:
+    if editable.footprint is None:
         step["left_out"] = True
     return step
 

@@ -1,14 +1,13 @@
-"""What the scene's camera sees of a ground: how far the picture reaches, and where it comes close."""
+"""The scene's camera above a ground: how far the picture reaches, and where it comes close."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..numerics.arrays import Array, Mask
+
 Place = tuple[float, float, float]
 
 PIXELS = 0.75
@@ -54,7 +53,7 @@ class CameraView:
         )
 
     def reach(self, height: float) -> Array:
-        """Where the corners of the picture lie on level ground, (N, 2) [m]; far away for those above the horizon.
+        """Corners of the picture on level ground, (N, 2) [m]; far away for those above the horizon.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""What grounds crumble into, at the edge of a print and in the air alike: one law of sizes, one set of shapes.
+"""Crumbs of grounds, at the edge of a print and in the air alike: one law of sizes, one set of shapes.
 
 References
 ----------

@@ -36,7 +36,7 @@ def strain(load: Any, material: GroundMaterial) -> Any:
 
 
 def loose_strain(load: Any, material: GroundMaterial) -> Any:
-    """What the strain would be if the layer could be packed without end; of a number or an array."""
+    """Strain of a layer that packs without limit; of a number or an array."""
     loose = load if material.exponent == 1.0 else load ** (1.0 / material.exponent)
     if not material.firm_depth:
         return loose

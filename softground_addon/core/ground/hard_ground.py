@@ -104,7 +104,7 @@ class HardOnSoft:
 
 
 class _Bare:
-    """What of the soft ground no hard object covers."""
+    """Soft ground that no hard object covers."""
 
     def __init__(self, terrain: HardOnSoft) -> None:
         self.terrain = terrain

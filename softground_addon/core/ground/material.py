@@ -1,4 +1,4 @@
-"""What the ground is made of, and how far each of its parameters may go."""
+"""Material of the ground, and the limits of its parameters."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ HARD = -1.0
 
 @dataclass(frozen=True)
 class GroundKind:
-    """What a region is made of.
+    """Surface and material of a region.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class GroundKind:
 
 @dataclass(frozen=True)
 class Regions:
-    """Where a ground is of which kind.
+    """Map of the kinds of a ground.
 
     Attributes
     ----------

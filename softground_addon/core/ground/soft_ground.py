@@ -6,27 +6,25 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .heightfield import HeightField, Terrain
 from .material import STANDARD_GRAVITY, GroundMaterial, Pressure
 from .regions import Regions
 from .sparse_grid import SparseGrid, Window
 from .variation import Variation
 
-Array = NDArray[np.float64]
-
 
 class Weathering(Protocol):
-    """What weather does between one contact and the next; frames are those of the scene."""
+    """Effect of weather between one contact and the next; frames are those of the scene."""
 
     @property
     def reach(self) -> float:
-        """How far around it what a cell becomes depends on the ground [m]."""
+        """Distance within which the ground around a cell acts on it [m]."""
         ...
 
     def level(self, frame: float) -> float:
-        """How much higher open ground is at a frame than without weather, where steps press what fell [m]."""
+        """Height of open ground at a frame above that without weather, where steps press what fell [m]."""
         ...
 
     def aged(
@@ -64,7 +62,7 @@ class Weathering(Protocol):
 
 @dataclass(frozen=True)
 class SoftGround:
-    """What a simulation presses.
+    """Ground that a simulation presses.
 
     Attributes
     ----------
@@ -97,7 +95,7 @@ class SoftGround:
         return any(material.repose_angle for material in (self.material, *(kind.material for kind in kinds)))
 
     def materials_under(self, window: Window, cell_size: float) -> list[GroundMaterial]:
-        """What it is made of under a window of cells of that side [m]."""
+        """Materials under a window of cells of that side [m]."""
         if self.regions is None:
             return [self.material]
         return [self.regions.kinds[number].material for number in self.regions.under(window, window, cell_size)[0]]

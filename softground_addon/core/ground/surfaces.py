@@ -1,4 +1,4 @@
-"""What grounds are made of: one record for each surface, with all that follows from what it is made of.
+"""Surfaces of grounds: one record for each, with all of its properties.
 
 A new look is a record here, a function of `blender.materials.surface_shaders` and a preset with its picture.
 
@@ -121,7 +121,7 @@ class Voice:
 
 @dataclass(frozen=True)
 class Soaking:
-    """How fast ground takes up water: at first and in the end [m/s], and how fast it goes from one to the other [1/s].
+    """Rates at which ground takes up water: at first and in the end [m/s], and the decay between them [1/s].
 
     As Horton's f = final + (first - final)·exp(-decay·t). Water from below fills a print over a time `seep` [s].
     """
@@ -134,7 +134,7 @@ class Soaking:
 
 @dataclass(frozen=True)
 class CarriedFilm:
-    """What stays on a sole that leaves the ground, and comes off on hard floors.
+    """Film that stays on a sole and comes off on hard floors.
 
     Attributes
     ----------
@@ -142,8 +142,8 @@ class CarriedFilm:
         One of `CARRIED_KINDS`.
     most, taken : float
         Mass per area of the sole at most, and that a clean one takes up in one step [kg/m²].
-    left : float
-        Share of it that a sole which presses hard leaves on a floor.
+    deposited : float
+        Share of it that a sole deposits on a floor under high pressure.
     water : float
         Share of the mass that dries.
     """
@@ -151,7 +151,7 @@ class CarriedFilm:
     kind: str
     most: float
     taken: float
-    left: float
+    deposited: float
     water: float
 
 
@@ -161,7 +161,7 @@ CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
 
 @dataclass(frozen=True)
 class Liquid:
-    """What wets hard floors; its fields are those of `SurfaceRecord`."""
+    """Liquid on hard floors; its fields are those of `SurfaceRecord`."""
 
     name: str
     density: float
@@ -177,7 +177,7 @@ class Liquid:
 
 @dataclass(frozen=True)
 class SurfaceRecord:
-    """What a ground is made of.
+    """Properties of a surface.
 
     Attributes
     ----------
@@ -258,7 +258,7 @@ SURFACES = {record.name: record for record in (
         shader="snow", relief="snow", midi_note=36,
         wall_packing=0.73, wall_cohesion=180.0,
         drifts_from=0.27, melts=True, control="hand_hardness",
-        carried=CarriedFilm("snow", most=0.3, taken=0.2, left=0.5, water=1.0),
+        carried=CarriedFilm("snow", most=0.3, taken=0.2, deposited=0.5, water=1.0),
     ),
     SurfaceRecord(
         "sand",
@@ -281,7 +281,7 @@ SURFACES = {record.name: record for record in (
         shader="wet_sand", relief="wet_sand", midi_note=44,
         wall_packing=0.05, wall_cohesion=1000.0,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
-        carried=CarriedFilm("sand", most=0.8, taken=0.5, left=0.35, water=0.2),
+        carried=CarriedFilm("sand", most=0.8, taken=0.5, deposited=0.35, water=0.2),
     ),
     SurfaceRecord(
         "mud",
@@ -296,7 +296,7 @@ SURFACES = {record.name: record for record in (
         shader="mud", relief="mud", midi_note=48,
         wall_packing=0.0, wall_cohesion=2000.0,
         soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",
-        carried=CarriedFilm("mud", most=3.5, taken=2.5, left=0.2, water=0.35),
+        carried=CarriedFilm("mud", most=3.5, taken=2.5, deposited=0.2, water=0.35),
     ),
     SurfaceRecord(
         "soil",
@@ -323,8 +323,10 @@ HARD_NOTE = 56
 LIQUIDS = {
     liquid.name: liquid
     for liquid in (
-        Liquid("water", 1000.0, (0.1, 0.1, 0.1), CarriedFilm("water", most=0.1, taken=0.1, left=0.35, water=1.0)),
-        Liquid("paint", 1200.0, (0.25, 0.006, 0.004), CarriedFilm("paint", most=0.25, taken=0.2, left=0.35, water=0.5)),
+        Liquid("water", 1000.0, (0.1, 0.1, 0.1), CarriedFilm("water", most=0.1, taken=0.1, deposited=0.35, water=1.0)),
+        Liquid(
+            "paint", 1200.0, (0.25, 0.006, 0.004), CarriedFilm("paint", most=0.25, taken=0.2, deposited=0.35, water=0.5)
+        ),
     )
 }
 """What hard floors are wet with, by name; the colour of paint is the artist's to change."""

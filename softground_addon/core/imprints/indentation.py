@@ -88,7 +88,7 @@ class Springs:
     def _searched_sinkage(
         self, force: float, material: GroundMaterial, firmness: float, near: float, deepest: float
     ) -> float:
-        """By regula falsi in logarithms, in which a power law is a straight line."""
+        """Sinkage by regula falsi in logarithms, in which a power law is a straight line."""
         weight = self.area * self.stiffness * (material.youngs_modulus * firmness) * (np.asarray(self.depth) > 0)
         layer = np.maximum(material.layer_depth * np.asarray(self.depth), TINY)
 

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from ..loads.contacts import LEAVE_SPEED, REST_SPEED, TOUCH_HEIGHT, TOUCH_SPEED
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
 from .foot_placement import PressedGround, between_contacts
 from .sole_rim import along, posed_rim, rim_pieces
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 PLANTED = 0.01
 """Points of a sole bear that are this near to its lowest, in sole lengths (3 mm of an adult's shoe)."""

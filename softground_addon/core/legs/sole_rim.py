@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
+from ..numerics.arrays import Array
 from ..numerics.bilinear import sample_map
 from .foot_placement import Pieces, posed_points
-
-Array = NDArray[np.float64]
 
 
 def rim(sole: Sole) -> Pieces:

@@ -144,7 +144,7 @@ class Coverage:
 
 
 def coverage_of(loads: Sequence[CharacterLoads]) -> Coverage:
-    """What the soles of all characters cover."""
+    """Coverage of the soles of all characters."""
     area = edge = 0.0
     boxes, steps = [], []
     for character in loads:

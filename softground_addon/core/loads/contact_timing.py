@@ -224,7 +224,7 @@ def _onset(force: Array, first: int, search: int) -> float:
 
 
 def _last_below(rising: Array, level: float) -> float:
-    """Where a curve crosses a level for the last time, in fractional samples; -1 where it never is below it."""
+    """Last crossing of a level by a curve, in fractional samples; -1 if it is never below."""
     below = np.flatnonzero(rising < level)
     if not len(below) or below[-1] == len(rising) - 1:
         return -1.0

@@ -1,4 +1,4 @@
-"""From a character's motion to its loads: contacts and forces on the simulation's time grid."""
+"""Estimate of loads from a character's motion: contacts and forces on the simulation's time grid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
 
 @dataclass(frozen=True)
 class CharacterLoads:
-    """What one character does to the ground, on the simulation's time grid."""
+    """Loads of one character on the ground, on the simulation's time grid."""
 
     motion: CharacterMotion
     contacts: Contacts

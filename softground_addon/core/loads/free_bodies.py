@@ -134,7 +134,7 @@ def _pushed(
     lasting: int,
     landing_only: bool,
 ) -> Array:
-    """What the ground's push beyond the weight accelerates a body by at each of N steps, (N, 3) [m/s²].
+    """Acceleration of a body by the ground's push beyond its weight at each of N steps, (N, 3) [m/s²].
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) 
 
 
 def advice(name: str, missed: Sequence[MissedStep], ground: str) -> Finding:
-    """What to tell the user of a character's missed steps: how many, from when on, and what to do."""
+    """Message about a character's missed steps: how many, from when on, and what to do."""
     several = len(missed) > 1
     count, meet, leave = (f"{len(missed)} steps", "meet", "leave") if several else ("1 step", "meets", "leaves")
     beyond = sum(np.isinf(step.clearance) for step in missed)

@@ -54,7 +54,7 @@ def reach_of(motions: Sequence[CharacterMotion]) -> Reach:
 
 
 def raised_rests(motion: CharacterMotion, terrain: Terrain) -> Iterator[RaisedRest]:
-    """Where soles of a body rest well above a terrain."""
+    """Places where soles of a body rest well above a terrain."""
     if motion.centre is not None:
         return  # a prop may lie anywhere
     shortest = SHORTEST_CONTACT * motion.pendulum_time / motion.time_step

@@ -1,4 +1,4 @@
-"""From where to where a print goes: a contact leaves one, but that of a body that travels on the ground several."""
+"""Tracks of prints: a contact leaves one print, that of a body that travels on the ground several."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class CharacterMotion:
         return self.gravity / scale_to_metres(self.stature)
 
     def upward(self, centre: Array, velocity: Array) -> Array:
-        """What carries the body at each sample, at places [m] with velocities [m/s], per weight: (3,) or (F, 3)."""
+        """Support of the body per weight at each sample, at places [m] with velocities [m/s]: (3,) or (F, 3)."""
         return self.ride.upward(self.frames, centre, velocity) if self.ride else UP
 
     @property

@@ -1,4 +1,4 @@
-"""What two legs and a height tell of a body: that it is a person, what it weighs, and in what unit its file is."""
+"""People by their legs and height: if a body is a person, its mass, and the unit of its file."""
 
 from __future__ import annotations
 

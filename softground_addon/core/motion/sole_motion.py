@@ -135,7 +135,7 @@ class SoleMotion:
     bears: NDArray[np.bool_] | None = None
 
     def landmark_positions(self) -> Array:
-        """World positions of the sole's landmarks, (F, L, 3) [m]; worked out once, not to be written to."""
+        """World positions of the sole's landmarks, (F, L, 3) [m]; computed once, not to be written to."""
         return self._landmark_positions
 
     @cached_property

@@ -10,20 +10,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.places import Places, inside
 from ..ground.sparse_grid import Window
 from ..numerics import bilinear
+from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief.steps import NOTHING, StepRelief
 from .blocks import BLOCK, ChangesInBlocks
 from .ramps import TOLERANCE, Ramps, fit, grown, joined, side_by_side
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, layer_factors
@@ -20,6 +19,7 @@ from ..imprints.sole_points import (
     touching_fraction,
 )
 from ..motion.sole_motion import Sole
+from ..numerics.arrays import Array
 from ..record.contact_steps import Steps
 from .contact_layout import ContactLayout
 from .deformation import Sinking, compression_rate, sink, target_compression
@@ -27,8 +27,6 @@ from .ground_cells import GroundCells, Imprints, Loads, UndisturbedCells
 from .plate import Plate, plate_of
 from .pressure import pressure_field, spread_out
 from .rim import in_contact, rim_weights, whole_reach
-
-Array = NDArray[np.float64]
 
 
 class SoleLayout(ContactLayout):

@@ -103,7 +103,7 @@ class BakeRecord:
         laid: dict[int, Footprint] = {}
         for step in self.steps:
             number = step.index % len(self.footprints)
-            if step.left is None or (carve := self.carves.get(number)) is None:
+            if step.footprint is None or (carve := self.carves.get(number)) is None:
                 continue
             was, now = placement(before.get(number, step_edits.UNCHANGED)), placement(step.edit)
             known = self._laid.get(step.index)
@@ -116,7 +116,7 @@ class BakeRecord:
     @property
     def edited(self) -> list[Footprint]:
         """The footprints after the artist's edits, in their order."""
-        prints = [step.left for step in self.steps if step.left is not None]
+        prints = [step.footprint for step in self.steps if step.footprint is not None]
         return sorted(prints, key=lambda footprint: footprint.start_frame) if self.edits else prints
 
     def with_about(self, about: Mapping[str, Any]) -> BakeRecord:
@@ -143,8 +143,8 @@ class EditableStep:
         See `edits`.
     baked : Footprint
         As it was baked; of a copy, its original.
-    left : Footprint or None
-        As it lies on the ground, without the thrown volume; None if nothing of it does.
+    footprint : Footprint or None
+        After the edits, without the thrown volume; None if it leaves no print.
     thrown : mapping of str to float
         Thrown volumes by phase [m³].
     """
@@ -152,7 +152,7 @@ class EditableStep:
     name: str
     index: int
     baked: Footprint
-    left: Footprint | None
+    footprint: Footprint | None
     edit: step_edits.StepEdit
     is_copy: bool
     thrown: Mapping[str, float]
@@ -248,7 +248,7 @@ def load(content: bytes) -> BakeRecord:
 
 
 def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.StepEdit]]:
-    """What is known about the footprints in such bytes, and the artist's edits of them; errors as of `load`.
+    """Facts about the footprints in such bytes, and the artist's edits of them; errors as of `load`.
 
     The footprints themselves are not unpacked.
     """
@@ -257,8 +257,8 @@ def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.Ste
             text = _text(archive, len(content))
         about, edits = dict(text["about"]), text["edits"]
         if text["format"] != FORMAT:
-            left = load(content)
-            return dict(left.about), dict(left.edits)
+            record = load(content)
+            return dict(record.about), dict(record.edits)
     except _DAMAGE as error:
         raise _damaged(error) from None
     return about, step_edits.from_json(edits, _EDITS)

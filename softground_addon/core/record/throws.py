@@ -32,7 +32,7 @@ _MOST_POINTS = 10_000
 
 
 class ThrowKind(IntEnum):
-    """Where thrown matter comes from; a slide is a push."""
+    """Source of thrown matter; a slide is a push."""
 
     LANDING = 0
     PUSH = 1

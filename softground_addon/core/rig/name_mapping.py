@@ -1,4 +1,4 @@
-"""Roles of bones by the names of the usual rigs; those with the same word are told apart by what hangs on what."""
+"""Roles of bones by the names of the usual rigs; the hierarchy separates those with the same word."""
 
 from __future__ import annotations
 

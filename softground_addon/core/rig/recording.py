@@ -81,7 +81,7 @@ class Recording:
         return bool(np.ptp(self.poses, axis=0).max(initial=0.0) > _STILL * np.abs(self.poses).max(initial=0.0))
 
     def bone(self, name: str) -> Array:
-        """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
+        """World matrices of a bone, (F, 4, 4) [m]; computed at each call, as all bones at once take much memory."""
         pose = self.poses[:, self.bones.index(name)].astype(float)
         return self._in_metres(self.world @ np.swapaxes(pose, -1, -2))
 
@@ -97,7 +97,7 @@ class Recording:
         )
 
     def in_frame(self) -> Recording:
-        """What was read in the world, as seen in the frame that it is solved in."""
+        """The recording in the frame that it is solved in, rather than in the world's."""
         if self.units.frame is None:
             return self
         turn = self.units.frame.from_world(self.frames)

@@ -1,4 +1,4 @@
-"""What a skin shows of the contacts of a body: which bones carry them, and whether they print by all sides."""
+"""Contacts of a body that its skin shows: which bones carry them, and whether they print by all sides."""
 
 from __future__ import annotations
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.triangles import SLACK, cross
-
-Array = NDArray[np.float64]
 
 SUPERSAMPLING = 4
 """Samples per node along each axis; edges are then known to a few per cent of the node distance."""

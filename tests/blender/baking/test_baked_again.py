@@ -5,7 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softground_addon.blender import jobs, kept
+from softground_addon.blender import jobs, reuse
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.ground import baked_ground, ground_mesh
@@ -92,16 +92,16 @@ def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, cha
     for name, value in changes:
         CHANGES[name](scene, value)
         as_it_comes = left(scene)
-        kept.forget()
+        reuse.forget()
         assert left(scene) == as_it_comes, name
 
 
 def anew(scene, change=lambda: None):
-    """What a bake after a change works out anew, of what is kept."""
+    """What a bake after a change works out anew, of what was held."""
     change()
-    before = {key: held[1] for key, held in state.kept.items()}
+    before = {key: held[1] for key, held in state.results.items()}
     bake(scene)
-    return {key[0] for key, held in state.kept.items() if before.get(key) is not held[1]}
+    return {key[0] for key, held in state.results.items() if before.get(key) is not held[1]}
 
 
 def presses(scene, change=lambda: None):
@@ -162,21 +162,23 @@ def test_landings_follow_the_time_that_the_ground_needs(again, value):
     again.softground.characters[0].force_model = "IMPULSE"
     bake(again)
     assert "loads" in anew(again, lambda: setattr(again.softground.material, "characteristic_time", value))
-    assert left(again) == (kept.forget(), left(again))[1]
+    assert left(again) == (reuse.forget(), left(again))[1]
 
 
 def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):
     bake(again)
-    held, sizes = kept._size(*(each[1] for each in state.kept.values())), dict(state.kept)
+    held, sizes = reuse._size(*(each[1] for each in state.results.values())), dict(state.results)
     assert 0 < held < 80 * len(baked_ground.stored_record(again.softground.ground))
     bpy.ops.softground.clear_bake()
-    assert not state.kept
+    assert not state.results
     largest = max(each[2] for each in sizes.values())
-    monkeypatch.setattr(kept, "LARGEST", largest - 1)
+    monkeypatch.setattr(reuse, "LARGEST", largest - 1)
     bake(again)
-    assert {key: each[2] for key, each in state.kept.items()} == {k: e[2] for k, e in sizes.items() if e[2] < largest}
+    assert {key: each[2] for key, each in state.results.items()} == {
+        k: e[2] for k, e in sizes.items() if e[2] < largest
+    }
     monkeypatch.undo()
     bake(again)
-    assert ("prints", "") in state.kept
+    assert ("prints", "") in state.results
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not state.kept
+    assert not state.results

@@ -7,13 +7,14 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from softground_addon.blender import jobs, kept, session
+from softground_addon.blender import jobs, reuse, session
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.operators import modal_bake, modal_job
 from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
+from softground_addon.core.composers import pressed_shot
 from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
 from tests.blender.redraws import fill, least_seconds, walk_over_all_objects
@@ -84,7 +85,7 @@ def test_prints_are_shown_as_they_are_pressed_where_somebody_looks_on(scene):
     prepare(scene, "fine")
     jobs.run(bake_job.bake(scene))
     assert state.pressing is None
-    kept.forget()
+    reuse.forget()
     session.show_bake(0.0, "")
     counts = []
     for progress in bake_job.bake(scene):
@@ -93,10 +94,24 @@ def test_prints_are_shown_as_they_are_pressed_where_somebody_looks_on(scene):
     assert 0 in counts
     assert counts == sorted(counts)
     record = baked_ground.record_of(scene.softground.ground)
-    assert sorted(map(id, state.pressing.footprints)) == sorted(map(id, state.kept["prints", ""][1].left.footprints))
+    assert sorted(map(id, state.pressing.footprints)) == sorted(
+        map(id, state.results["prints", ""][1].record.footprints)
+    )
     assert len(record.footprints) == len(state.pressing.footprints) > 0
     session.show_no_bake()
     assert state.pressing is None
+
+
+def test_each_print_is_shown_once_where_bodies_lean(scene, monkeypatch):
+    prepare(scene, "fine")
+    scene.softground.tilt.use = True
+    monkeypatch.setattr(pressed_shot, "leans_anew", lambda now, before: before is None)
+    reuse.forget()
+    session.show_bake(0.0, "")
+    jobs.run(bake_job.bake(scene))
+    shown = len(state.pressing.footprints)
+    session.show_no_bake()
+    assert shown == len(baked_ground.record_of(scene.softground.ground).footprints)
 
 
 def pictures_of(scene, folder):
@@ -363,12 +378,12 @@ def test_a_shot_is_read_in_steps_and_leaves_no_trace_where_that_ends(scene):
     walker(scene, frames=40)
     bpy.ops.softground.add_character()
     before = fingerprints.of_file()
-    kept.forget()
+    reuse.forget()
     steps = len(list(analysis.reading(scene)))
     assert steps > 30
     for end in range(0, steps, 7):
         analysis.forget()
-        kept.forget()
+        reuse.forget()
         job = analysis.reading(scene)
         for _ in range(end):
             next(job)

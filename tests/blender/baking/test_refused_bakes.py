@@ -65,9 +65,11 @@ def bridge(scene):
     ground.modifiers["twice"].constant_offset_displace = (0, 0, -1.0)
 
 
-def moving_ground(scene):
+def growing_ground(scene):
     ground = scene.softground.ground = plane(scene)
-    ground.keyframe_insert("location", frame=1)
+    for frame, size in ((1, 1.0), (20, 1.5)):
+        ground.scale = (size, size, size)
+        ground.keyframe_insert("scale", frame=frame)
 
 
 def edited_body(scene):
@@ -91,7 +93,7 @@ def edited_body(scene):
         (far_below, "'Walker'.*touches 'Field'.*move"),
         (far_away, "'Field' has no face under.*move it under the feet"),
         (bridge, "'Field' has several layers.*separate"),
-        (moving_ground, "'Field' moves"),
+        (growing_ground, "Ground 'Field' changes its size"),
         (edited_body, "'Walker Figure'.*Edit Mode: leave it"),
     ],
 )

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from softground_addon.blender import jobs
-from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender import jobs, session
+from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
+from softground_addon.blender.viewport import overlay
 from softground_addon.core.errors import InputError
 from softground_addon.core.record.edits import StepEdit
 from tests.blender.grounds import as_rendered, bake, field
@@ -245,7 +247,7 @@ def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
     result = bake(short_walk)
     short_walk.frame_set(20)
     edited = jobs.run(step_edits.reading(short_walk))
-    name = edited.left.steps[1].name
+    name = edited.record.steps[1].name
     jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
     left = baked_ground.record_of(short_walk.softground.ground).edited
     assert len(left) == len(result.footprints)
@@ -278,3 +280,23 @@ def test_live_mode_presses_a_deck_that_sails(short_walk):
         assert as_rendered(shown)[:, 2].min() == pytest.approx(deepest, abs=2e-3)
     finally:
         live.discard()
+
+
+@pytest.mark.parametrize("where", ["on_a_wall", "on_a_ship"])
+def test_early_prints_are_drawn_where_the_bake_puts_them(short_walk, where):
+    if where == "on_a_ship":
+        deck(short_walk, keyed=sailing)
+        short_walk.frame_set(20)
+    else:
+        field(short_walk)
+        moved(short_walk, WHERE[where])
+    session.show_bake(0.0, "")
+    steps = jobs.run(bake_job.bake(short_walk)).report["steps"]
+    try:
+        prints = sorted(state.pressing.footprints, key=lambda each: each.start_frame)
+        drawn = [overlay.corners_of(each, state.pressing, short_walk) for each in prints]
+    finally:
+        session.show_no_bake()
+    assert len(drawn) == len(steps) == 3
+    for corners, step in zip(drawn, steps, strict=True):
+        assert (corners.min(axis=0) + corners.max(axis=0)) / 2 == pytest.approx(step["position"], abs=0.08)

@@ -83,7 +83,7 @@ def edit_a_step(chance, scene):
     """Change a step of the bake, where there is one that can be."""
     try:
         bake = jobs.run(step_edits.reading(scene))
-        name = step_id(chance.choice(bake.left.footprints))
+        name = step_id(chance.choice(bake.record.footprints))
         jobs.run(
             step_edits.editing(
                 scene, bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)}

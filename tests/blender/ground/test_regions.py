@@ -162,10 +162,10 @@ def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     choose()
     bake(four)
     editable = jobs.run(step_edits.reading(four))
-    number, step = next((n, s) for n, s in enumerate(editable.left.steps) if where(s.baked) == 0)
+    number, step = next((n, s) for n, s in enumerate(editable.record.steps) if where(s.baked) == 0)
     edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
     jobs.run(step_edits.editing(four, editable, {step.name: edit}))
-    left = baked_ground.record_of(four.softground.ground).steps[number].left
+    left = baked_ground.record_of(four.softground.ground).steps[number].footprint
     assert left.surface == "mud"
     assert left.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
 
@@ -309,8 +309,8 @@ def test_crumbs_look_like_the_material_that_they_come_from(four):
     steps = baked_ground.record_of(four.softground.ground).steps
     number = np.empty(len(looks), np.int32)
     debris.data.attributes["step"].data.foreach_get("value", number)
-    order = ["snow", *dict.fromkeys(step.left.surface for step in steps if step.left.surface != "snow")]
-    assert [order[look] for look in looks] == [steps[n].left.surface for n in number]
+    order = ["snow", *dict.fromkeys(step.footprint.surface for step in steps if step.footprint.surface != "snow")]
+    assert [order[look] for look in looks] == [steps[n].footprint.surface for n in number]
     four.frame_set(four.softground.frame_end + 60)
     shown = debris.evaluated_get(bpy.context.evaluated_depsgraph_get())
     pieces = {
@@ -347,7 +347,7 @@ def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, 
     assert set(depths_of_layers(ground)[0]) == {np.float32(four.softground.material.layer_depth)}
     editable = jobs.run(step_edits.reading(four))
     assert editable.made_with.under == "ALWAYS"
-    jobs.run(step_edits.editing(four, editable, {editable.left.steps[0].name: StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(four, editable, {editable.record.steps[0].name: StepEdit(mute=True)}))
     assert depths_of_layers(ground) is not None
     four.softground.under = "AUTO"
     thin = replace(presets.find("mud"), material=replace(presets.find("mud").material, layer_depth=0.04))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_surface, refined_mesh, trail_detail
-from softground_addon.blender.settings import found
+from softground_addon.blender.settings import resolve
 from softground_addon.core.meshing.refinement import refine
 from softground_addon.core.meshing.region import Region
 from softground_addon.core.numerics.cell_keys import keys_of
@@ -75,7 +75,7 @@ def refined(ground, spacing=0.02, where=None):
     surface = trail_detail.surface_of(ground, 1.0)
     with ExitStack() as drafts:
         draft = trail_detail.draft(drafts, ground, surface, refine(surface, where or region(), spacing))
-        return trail_detail.publish(ground, found(draft))
+        return trail_detail.publish(ground, resolve(draft))
 
 
 def triangles_of(mesh):

@@ -238,7 +238,7 @@ def test_a_bake_is_made_of_the_settings_that_it_began_with_and_says_so(scene, gi
     )
     assert result.report["input_hash"] == undisturbed.report["input_hash"]
     assert not baked_ground.is_baked(other)
-    ground = settings.found(began_with.ground) if given else scene.softground.ground
+    ground = settings.resolve(began_with.ground) if given else scene.softground.ground
     _, about = baked_ground.load(ground)
     assert about["inputs"] == result.report["inputs"]
     assert about["inputs"]["material"]["youngs_modulus"] == began_with.material.youngs_modulus
@@ -299,5 +299,5 @@ def test_an_object_is_found_under_another_name(scene):
     ground = plane(scene)
     name = settings.name_of(ground)
     ground.name, plane(scene).name = "Meadow", name.name
-    assert settings.found(name) == ground
+    assert settings.resolve(name) == ground
     assert np.array(ground.matrix_world).shape == (4, 4)

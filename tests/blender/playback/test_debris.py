@@ -190,8 +190,8 @@ def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     before = fingerprints.of_mesh(debris_object.of(ground).data)
     bake = jobs.run(step_edits.reading(scene))
     number = int(values(debris_object.of(ground), "step")[0])
-    jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[number]): StepEdit(mute=True)}))
-    assert set(values(debris_object.of(ground), "step")) == set(bake.left.thrown) - {number}
+    jobs.run(step_edits.editing(scene, bake, {step_id(bake.record.footprints[number]): StepEdit(mute=True)}))
+    assert set(values(debris_object.of(ground), "step")) == set(bake.record.thrown) - {number}
     jobs.run(step_edits.editing(scene, bake, {}))
     assert fingerprints.of_mesh(debris_object.of(ground).data) == before
 
@@ -200,7 +200,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     """Moved, deepened, scaled and shifted in time, muted, and a copy on an earlier print."""
     ground = scene.softground.ground
     bake = jobs.run(step_edits.reading(scene))
-    names = [step_id(one) for one in bake.left.footprints]
+    names = [step_id(one) for one in bake.record.footprints]
     edits = {
         names[0]: StepEdit(move_m=(0.3, 0.2), turn_deg=40.0),
         names[1]: StepEdit(strength=2.0),
@@ -222,12 +222,12 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     assert 2 not in steps
     displaced = 2 * scene.softground.material.poisson_ratio
     for step in left.steps:
-        if step.left:
+        if step.footprint:
             thrown = sum(step.thrown.values())
-            assert step.left.rim_m3 + thrown == pytest.approx(displaced * step.left.compressed_m3, rel=1e-6)
+            assert step.footprint.rim_m3 + thrown == pytest.approx(displaced * step.footprint.compressed_m3, rel=1e-6)
     totals = report["totals"]
     assert totals["rim_m3"] + totals["thrown_m3"] == pytest.approx(
-        displaced * sum(step.left.compressed_m3 for step in left.steps if step.left), rel=1e-6
+        displaced * sum(step.footprint.compressed_m3 for step in left.steps if step.footprint), rel=1e-6
     )
     thrown = sum(row["thrown_kg"] for row in baked_ground.events_of(ground))
     assert thrown == pytest.approx(totals["thrown_m3"] * SURFACES["sand"].density, rel=1e-3)
@@ -236,17 +236,17 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
 def test_no_piece_stays_where_a_print_is_dragged_away_from_under_it(scene):
     obj = debris_object.of(scene.softground.ground)
     bake = jobs.run(step_edits.reading(scene))
-    step = bake.left.steps[1]
+    step = bake.record.steps[1]
     before = fingerprints.of_mesh(obj.data)
     place, radius = places_of(obj)[:, :2], values(obj, "radius")
-    in_print = np.abs(place - step.left.position[:2]).max(axis=1) < 0.1
+    in_print = np.abs(place - step.footprint.position[:2]).max(axis=1) < 0.1
     thrown = values(obj, "step") == step.index
     assert in_print.sum() > 100
     assert (thrown & ~in_print).sum() > 100
     preview = StepPreview(scene.softground.ground, bake)
     preview.show({step.name: StepEdit(move_m=(0.0, 0.5))})
     assert not values(obj, "radius")[in_print | thrown].any()
-    far = np.abs(place - step.left.position[:2]).max(axis=1) > 1.5
+    far = np.abs(place - step.footprint.position[:2]).max(axis=1) > 1.5
     assert np.array_equal(values(obj, "radius")[far & ~thrown], radius[far & ~thrown])
     preview.end()
     assert fingerprints.of_mesh(obj.data) == before
@@ -256,7 +256,7 @@ def test_debris_that_was_deleted_stays_away_from_edited_steps(scene):
     ground = scene.softground.ground
     bpy.data.objects.remove(debris_object.of(ground))
     bake = jobs.run(step_edits.reading(scene))
-    jobs.run(step_edits.editing(scene, bake, {step_id(bake.left.footprints[0]): StepEdit(strength=0.5)}))
+    jobs.run(step_edits.editing(scene, bake, {step_id(bake.record.footprints[0]): StepEdit(strength=0.5)}))
     assert debris_object.of(ground) is None
 
 

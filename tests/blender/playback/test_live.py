@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import handlers
+from softground_addon.blender import handlers, reuse
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground, created_ground, ground_mesh
@@ -551,6 +551,7 @@ def test_esc_as_live_mode_starts_leaves_everything_as_it_was(coarse_shot, ground
     assert steps > 50
     for share in (0.2, 0.5, 0.8, 1.0):
         analysis.forget()
+        reuse.forget()
         asked = int(share * (steps - 1))
         assert steps_taken(live_start.starting(coarse_shot), asked) == asked
         assert fingerprints.of_file() == before

@@ -383,7 +383,7 @@ def felt(addon, tmp_path_factory):
     bpy.ops.softground.add_weather()
     assert bpy.ops.softground.bake() == {"FINISHED"}
     bake = jobs.run(step_edits.reading(scene))
-    shoe = {step_id(bake.left.footprints[0]): StepEdit(sole="Shoe")}
+    shoe = {step_id(bake.record.footprints[0]): StepEdit(sole="Shoe")}
     jobs.run(step_edits.editing(scene, bake, step_soles.edits_with_soles(scene.objects, bake.made_with, shoe)))
     path = tmp_path_factory.mktemp("felt") / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

@@ -61,7 +61,7 @@ def test_a_step_is_chosen_muted_changed_and_reset(baked):
     depth = under(baked, step.baked.position)
     assert depth > 0.01
     bpy.ops.softground.mute_step()
-    assert baked_steps.chosen(baked.softground.ground)[0].left is None
+    assert baked_steps.chosen(baked.softground.ground)[0].footprint is None
     assert under(baked, step.baked.position) < 2e-3
     bpy.ops.softground.mute_step()
     assert stored(baked) == before
@@ -88,14 +88,14 @@ def test_a_step_is_copied_changed_kept_by_a_bake_and_deleted(baked):
         True,
         len(baked_steps.of(baked.softground.ground)),
     )
-    ahead = copy.left.position - step.baked.position
+    ahead = copy.footprint.position - step.baked.position
     assert 0.2 < np.linalg.norm(ahead[:2]) < 0.5
     assert ahead[1] == pytest.approx(-np.linalg.norm(ahead[:2]), abs=0.1)  # they walk along -y
-    assert under(baked, copy.left.position) == pytest.approx(under(baked, step.baked.position), rel=0.3)
+    assert under(baked, copy.footprint.position) == pytest.approx(under(baked, step.baked.position), rel=0.3)
     bpy.ops.softground.change_step(move=(0.5, 0.0), scale=1.4, shift=5)
     changed = baked_steps.chosen(baked.softground.ground)[0]
     assert changed.frames == (step.frames[0] + 5, step.frames[1] + 5)
-    assert changed.left.area_m2 == pytest.approx(1.4**2 * step.baked.area_m2, rel=0.05)
+    assert changed.footprint.area_m2 == pytest.approx(1.4**2 * step.baked.area_m2, rel=0.05)
     edited, ground = stored(baked), baked.softground.ground
     bpy.ops.softground.bake()
     assert record.dump(record.load(stored(baked))) == record.dump(record.load(edited))
@@ -114,7 +114,7 @@ def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
     bpy.ops.softground.add_step()
     added = baked_steps.chosen(baked.softground.ground)[0]
     assert added.frames[0] == 33
-    np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.02)
+    np.testing.assert_allclose(added.footprint.position[:2], (0.35, -0.8), atol=0.02)
     assert under(baked, (0.35, -0.8)) > 0.01
     baked.cursor.location = (300.0, 0.0, 0.0)
     with pytest.raises(RuntimeError, match="more than 100 m from step"):
@@ -135,7 +135,7 @@ def test_several_steps_are_chosen_and_changed_together_in_what_was_changed(baked
     edits = baked_ground.edits_of(baked.softground.ground)
     assert edits == {one.name: StepEdit(strength=0.5, scale=1.2), three.name: StepEdit(scale=1.2)}
     bpy.ops.softground.mute_step()
-    assert [step.left is None for step in baked_steps.of(baked.softground.ground)[:3]] == [True, False, True]
+    assert [step.footprint is None for step in baked_steps.of(baked.softground.ground)[:3]] == [True, False, True]
     bpy.ops.softground.reset_step()
     assert stored(baked) == before
 
@@ -248,7 +248,7 @@ def test_a_step_takes_the_sole_of_a_mesh(baked):
     bpy.ops.softground.change_step(step=one.name, sole="Shoe")
     shod = baked_steps.of(baked.softground.ground)[1]
     assert np.ptp(shod.outline()[:, :2], axis=0) == pytest.approx((0.1, 0.4), abs=0.05)  # it walks along -y
-    assert shod.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
+    assert shod.footprint.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
     assert not bake_report.stale_reasons(baked)
     shoe.location.x += 1.0
     bpy.context.view_layer.update()
@@ -257,10 +257,10 @@ def test_a_step_takes_the_sole_of_a_mesh(baked):
     bpy.context.view_layer.update()
     assert bake_report.stale_reasons(baked) == ("The mesh of 'Shoe', whose sole presses steps, has changed",)
     bpy.ops.softground.mute_step(step=two.name)
-    assert baked_steps.of(baked.softground.ground)[1].left.area_m2 == shod.left.area_m2
+    assert baked_steps.of(baked.softground.ground)[1].footprint.area_m2 == shod.footprint.area_m2
     assert bake_report.stale_reasons(baked)
     bpy.ops.softground.change_step(step=two.name, sole="Shoe")  # as it is now, also for the other step
-    assert baked_steps.of(baked.softground.ground)[1].left.area_m2 == pytest.approx(0.1 * 0.2, rel=0.25)
+    assert baked_steps.of(baked.softground.ground)[1].footprint.area_m2 == pytest.approx(0.1 * 0.2, rel=0.25)
     assert not bake_report.stale_reasons(baked)
     shoe.hide_set(True)
     shoe.hide_viewport = True
@@ -280,8 +280,8 @@ def test_a_step_is_added_in_the_sole_of_a_mesh(baked):
     bpy.ops.softground.add_step(sole="Shoe")
     added = baked_steps.chosen(baked.softground.ground)[0]
     assert (added.is_copy, added.edit.sole) == (True, "Shoe")
-    assert added.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
-    np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.03)
+    assert added.footprint.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
+    np.testing.assert_allclose(added.footprint.position[:2], (0.35, -0.8), atol=0.03)
 
 
 def test_a_mesh_points_its_toes_along_y_and_its_left_along_x(baked):

@@ -32,7 +32,7 @@ def test_a_sole_fills_up_as_a_geometric_series_and_holds_no_more_than_the_most(f
 @pytest.mark.parametrize("film", FILMS.values(), ids=FILMS)
 def test_equal_steps_fade_as_a_geometric_series_until_a_trace_is_left(film):
     share = share_left(2 * PRESSING, film)
-    assert share == pytest.approx(film.left * (1 - np.exp(-2)))
+    assert share == pytest.approx(film.deposited * (1 - np.exp(-2)))
     giving, carried = carry([Meeting(-1.0), *on_floor(*[share] * 400)], film, AREAS)
     films = np.array(giving)[1:, 0]
     count = int(np.ceil(np.log(TRACE * film.most / film.taken) / np.log(1 - share)))

@@ -35,7 +35,7 @@ def marks(surface="mud", muted=(), wet=None, **options):
     loads, footprints, terrain = crossing()
     terrain = replace(terrain, wet=wet or {})
     steps = steps_of(footprints, {}, {}, {})
-    steps = [replace(step, left=None) if step.index in muted else step for step in steps]
+    steps = [replace(step, footprint=None) if step.index in muted else step for step in steps]
     return marks_of([loads], steps, terrain, surface=surface, **options)
 
 
@@ -158,7 +158,7 @@ def test_soles_that_step_into_a_puddle_carry_it_on_and_leave_no_mark_in_it(liqui
     carried = found.carried
     assert of_steps.sum() == pytest.approx(carried.left_behind, abs=1e-9)
     assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
-    assert found.mass.max() <= film.most * film.left
+    assert found.mass.max() <= film.most * film.deposited
     assert marks("sand") is None
 
 
@@ -173,7 +173,7 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
     steps = steps_of(footprints, {}, {}, {})
     whole = marks()
     for muted in ((0,), (0, 1, 2), range(len(steps)), ()):
-        edited = [replace(step, left=None) if step.index in muted else step for step in steps]
+        edited = [replace(step, footprint=None) if step.index in muted else step for step in steps]
         found, anew = whole.with_steps(edited, {1: 1e-5}), marks(muted=muted, shed={1: 1e-5})
         assert found.mass == pytest.approx(anew.mass, abs=1e-12)
         carried = found.carried
@@ -186,7 +186,7 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
 def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
     loads, footprints, terrain = crossing()
     steps = steps_of([replace(step, surface="mud") for step in footprints], {}, {}, {})
-    muted = [replace(step, left=None) for step in steps]
+    muted = [replace(step, footprint=None) for step in steps]
     found = marks_of([loads], muted, terrain, surface=ground)
     assert not found.mass.any()
     assert found.with_steps(steps, {}).mass == pytest.approx(marks().mass)

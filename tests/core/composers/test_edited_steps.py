@@ -124,16 +124,16 @@ def test_a_copy_prints_as_the_moved_step_itself_and_leaves_that_one_alone(materi
     _, left = baked(material)
     away = StepEdit(move_m=(0.0, 1.5), turn_deg=30.0)
     moved, copied = edited(left, {1: away}, material), edited(left, {1 + len(left.footprints): away}, material)
-    print_of = next(step.left for step in copied.steps if step.is_copy)
+    print_of = next(step.footprint for step in copied.steps if step.is_copy)
     assert record.dump(BakeRecord((print_of,), {})) == record.dump(BakeRecord((moved.pressed_again[1],), {}))
     assert len(copied.edited) == len(left.footprints) + 1
-    assert copied.steps[1].left is left.footprints[1]
+    assert copied.steps[1].footprint is left.footprints[1]
 
 
 def test_a_copy_in_the_place_of_its_step_presses_little_further():
     _, left = baked()
     copied = edited(left, {1 + len(left.footprints): StepEdit(shift_frames=60)})
-    again = next(step.left for step in copied.steps if step.is_copy)
+    again = next(step.footprint for step in copied.steps if step.is_copy)
     assert again.compressed_m3 < 0.05 * left.footprints[1].compressed_m3
 
 

@@ -49,8 +49,8 @@ class Heard:
             left = replace(left, throws=step_throws.throws_of(loads, left.footprints, surface=surface))
         found = debris.sources(left.throws, left.steps, surface=surface, gravity=GRAVITY)
         self.pieces = debris.throw(found, surface=surface, gravity=GRAVITY, height=height)
-        self.left = replace(left, thrown=debris.volumes(found))
-        self.volume = np.array([sum(self.left.thrown.get(n, {}).values()) for n in range(len(left.footprints))])
+        self.record = replace(left, thrown=debris.volumes(found))
+        self.volume = np.array([sum(self.record.thrown.get(n, {}).values()) for n in range(len(left.footprints))])
 
     def __getattr__(self, name):
         return getattr(self.pieces, name)
@@ -83,12 +83,12 @@ def test_in_powder_what_the_ground_swallows_cannot_fly_and_all_that_it_leaves_ca
     loads, powder = jump(speed), find("fresh_snow").material
     _, record = pressed(loads, powder, cell_size=0.02)
     heard = Heard([loads], BakeRecord(record, {}), surface="snow")
-    for step, thrown_volume in zip(heard.left.steps, heard.volume, strict=True):
+    for step, thrown_volume in zip(heard.record.steps, heard.volume, strict=True):
         rim = 2 * powder.poisson_ratio * step.baked.compressed_m3
-        assert step.left.rim_m3 + thrown_volume == pytest.approx(rim, rel=1e-6)
-        on_ground = step.left.tile(step.left.rim).sum() * step.left.cell_size**2
+        assert step.footprint.rim_m3 + thrown_volume == pytest.approx(rim, rel=1e-6)
+        on_ground = step.footprint.tile(step.footprint.rim).sum() * step.footprint.cell_size**2
         assert on_ground + thrown_volume == pytest.approx(rim, rel=1e-6)
-        assert (step.left.rim_m3 < 1e-9) == (speed == 4.0)
+        assert (step.footprint.rim_m3 < 1e-9) == (speed == 4.0)
     low, high = litres
     assert low <= 1e3 * heard.volume.max() <= high
 
@@ -176,7 +176,7 @@ def test_plumes_are_fine_and_their_mist_comes_down_last(record, surface):
 
 
 def test_all_steps_of_a_long_run_share_the_pieces_that_a_bake_has(record):
-    left = replace(thrown(4.0, record).left, thrown={})
+    left = replace(thrown(4.0, record).record, thrown={})
     found = debris.sources(left.throws, left.steps, surface="sand", gravity=GRAVITY) * 60
     heard = debris.throw(found, surface="sand", gravity=GRAVITY, height=flat)
     assert 0.5 * debris.ALL_PIECES < len(heard.birth) <= debris.ALL_PIECES
@@ -184,7 +184,7 @@ def test_all_steps_of_a_long_run_share_the_pieces_that_a_bake_has(record):
 
 
 def test_a_slice_asks_for_the_ground_under_few_of_many_pieces(record):
-    left = replace(thrown(4.0, record).left, thrown={})
+    left = replace(thrown(4.0, record).record, thrown={})
     found, asked = debris.sources(left.throws, left.steps, surface="sand", gravity=GRAVITY) * 60, [0]
 
     def counted(x, y):
@@ -213,7 +213,7 @@ def test_events_tell_the_mass_that_each_phase_throws(record):
     heard = thrown(4.0, record)
     table = events([jump(4.0)], record, surface="sand", first_frame=1.0)
     assert not any(row["thrown_kg"] for row in table)
-    rows = as_edited(table, heard.left.steps)
+    rows = as_edited(table, heard.record.steps)
     total = sum(row["thrown_kg"] for row in rows)
     assert total == pytest.approx(heard.volume.sum() * SURFACES["sand"].density, abs=2e-6)
     assert all(row["thrown_kg"] == 0 for row in rows if row["phase"] not in ("land", "toe_off"))
@@ -235,7 +235,7 @@ def test_edited_steps_throw_where_when_and_as_much_as_they_press(record):
         step_id(record[1], 1): StepEdit(shift_frames=6),
     }
     plain = thrown(4.0, record)
-    left = replace(plain.left, edits=edits, pressed_again={0: turned, 1: None, 1 + count: later}, thrown={})
+    left = replace(plain.record, edits=edits, pressed_again={0: turned, 1: None, 1 + count: later}, thrown={})
     heard = Heard([], left)
     assert set(heard.step) == {0, 1 + count}
     before, after = plain.step == 0, heard.step == 0
@@ -249,13 +249,13 @@ def test_edited_steps_throw_where_when_and_as_much_as_they_press(record):
     assert heard.birth[heard.step == 1 + count].min() >= plain.birth[plain.step == 1].min() + 5
     assert heard.volume[0] == pytest.approx(plain.volume[0], rel=1e-6)
     assert heard.volume[1] == 0
-    for step, volume in ((heard.left.steps[0], heard.volume[0]), (heard.left.steps[2], plain.volume[1])):
-        assert step.left.rim_m3 + sum(step.thrown.values()) == pytest.approx(step.baked.rim_m3, rel=1e-12)
+    for step, volume in ((heard.record.steps[0], heard.volume[0]), (heard.record.steps[2], plain.volume[1])):
+        assert step.footprint.rim_m3 + sum(step.thrown.values()) == pytest.approx(step.baked.rim_m3, rel=1e-12)
         assert sum(step.thrown.values()) == pytest.approx(volume, rel=1e-6)
 
 
 def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(record):
-    left = thrown(4.0, record).left
+    left = thrown(4.0, record).record
     content = dump(left)
     again = load(content)
     assert dump(again) == content
@@ -280,7 +280,7 @@ def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(r
 
 
 def test_a_step_that_is_twice_as_large_throws_from_twice_as_far(record):
-    (way,) = [one for one in thrown(4.0, record).left.throws if one.number == 0 and one.kind == ThrowKind.LANDING]
+    (way,) = [one for one in thrown(4.0, record).record.throws if one.number == 0 and one.kind == ThrowKind.LANDING]
     larger = way.placed(record[0], record[0], StepEdit(scale=2.0))
     points, velocities = way.followed()
     assert larger.followed()[0] - record[0].position == pytest.approx(2 * (points - record[0].position), abs=1e-6)
@@ -310,7 +310,7 @@ def test_a_sole_that_slides_under_load_throws_what_it_drags_off_ahead_of_itself(
     assert heard.velocity[:, 0].mean() > 3 * abs(heard.velocity[:, 1].mean())
     at = np.interp(heard.birth, loads.motion.frames, time)
     assert 0.48 < at.min() < at.max() < 1.03
-    rows = as_edited(events([loads], record, surface="sand", first_frame=1.0), heard.left.steps)
+    rows = as_edited(events([loads], record, surface="sand", first_frame=1.0), heard.record.steps)
     assert {row["phase"] for row in rows if row["thrown_kg"]} == {"slide_start"}
 
 

@@ -179,7 +179,7 @@ def edits() -> dict:
 
 def area_of(name: str) -> float:
     """Area of a step's print [m²]."""
-    return next(float(step.left.area_m2) for step in steps() if step.name == name)
+    return next(float(step.footprint.area_m2) for step in steps() if step.name == name)
 
 
 def prints() -> str:

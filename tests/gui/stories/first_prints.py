@@ -43,7 +43,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     facts["steps"] = len(module("operators.baked_steps").of(scene.softground.ground))
 
     content = fingerprints.of_file()
-    module("kept").forget()
+    module("reuse").forget()
     yield from begin(hand)
     yield from hand.wait_for(lambda: len(shown()) > 0, 20)
     yield from hand.key("ESC")

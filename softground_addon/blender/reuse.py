@@ -1,0 +1,71 @@
+"""Results of a bake that the next bake takes over where their inputs are equal.
+
+All inputs are read anew each time and compared by value: who has changed keys, rigs, meshes or settings makes no
+difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..core.files.report import hash_inputs
+from ..core.numerics.packed import PackedArray
+from .jobs import meanwhile
+from .state import state
+
+Result = TypeVar("Result")
+State = TypeVar("State")
+
+LARGEST = 2**26
+"""Largest memory for the results of each kind [bytes]; the prints of a minute of walking take half of it."""
+
+
+def forget() -> None:
+    """Give back the memory: the next bake works out everything."""
+    state.results.clear()
+
+
+def reused(
+    told: State, kind: str, inputs: object, work: Generator[State, None, Result], *, of: str = ""
+) -> Generator[State, None, Result]:
+    """The last result of a kind if its inputs were equal, otherwise that of the work.
+
+    Parameters
+    ----------
+    told : State
+        Yielded while the inputs are compared.
+    inputs : object
+        All that the result depends on; `hash_inputs` compares it.
+    work : generator
+        Not begun where a result is taken over.
+    of : str
+        Name of one of several of a kind, of which each has its last result.
+    """
+    compared = yield from meanwhile(told, hash_inputs.slices(inputs))
+    if last := state.results.get((kind, of)):
+        if last[0] == compared:
+            result: Result = last[1]
+            return result
+        del last, state.results[kind, of]  # memory for the next
+    result = yield from work
+    size = _size(result)
+    if size + sum(each[2] for key, each in state.results.items() if key[0] == kind) <= LARGEST:
+        state.results[kind, of] = compared, result, size
+    return result
+
+
+def _size(*values: Any) -> int:
+    """Approximate memory of values [bytes]; what they share counts once."""
+    waiting, seen, size = list(values), set[int](), 0
+    while waiting:
+        value = waiting.pop()
+        if id(value) in seen or isinstance(value, type):
+            continue
+        seen.add(id(value))
+        size += value.nbytes if isinstance(value, np.ndarray | PackedArray) else 50
+        waiting += value.values() if isinstance(value, Mapping) else getattr(value, "__dict__", {}).values()
+        waiting += value if isinstance(value, list | tuple) else ()
+    return size
