@@ -13,7 +13,8 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...core.carried.film import Meeting
-from ...core.carried.marks import FloorSteps, Marks, SoleOnFloors
+from ...core.carried.floor_steps import FloorSteps, SoleOnFloors
+from ...core.carried.marks import Marks
 from ...core.ground import surfaces
 from ...core.meshing.face_edges import face_edges
 from ...core.record.record import EditableStep

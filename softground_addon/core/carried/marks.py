@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from types import MappingProxyType
 from typing import Any
 
@@ -23,7 +24,8 @@ from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.record import EditableStep
-from .film import ZONES, CarriedMass, Meeting, carry, share_left
+from .film import ZONES, CarriedMass, Meeting, share_left
+from .floor_steps import FloorSteps, SoleOnFloors
 from .hard_print import HardPrint, SoleGrid, laid, sole_grid
 
 LOOKED_AT = 32
@@ -80,83 +82,6 @@ class Marks:
 
 
 @dataclass(frozen=True)
-class SoleOnFloors:
-    """The way of a sole over hard floors, whatever it carries.
-
-    Attributes
-    ----------
-    of : (str, str)
-        Character and sole.
-    areas : (4,) float array
-        Of its zones [m²].
-    last_frame : float
-        Of the shot.
-    dirty : float
-        Film as the shot starts, over the thickest.
-    meetings : sequence of Meeting
-        With hard floors, in the order of time.
-    marks : sequence of int
-        Number of the mark that each of these leaves; -1 of none.
-    """
-
-    of: tuple[str, str]
-    areas: Array
-    last_frame: float
-    dirty: float
-    meetings: tuple[Meeting, ...]
-    marks: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class FloorSteps:
-    """Steps of all soles on hard floors: what they leave follows from these and the steps on soft ground.
-
-    Attributes
-    ----------
-    kind, ground : str
-        What they carry, and what the ground is made of where a step does not say.
-    soles : sequence of SoleOnFloors
-    """
-
-    kind: str
-    ground: str
-    soles: tuple[SoleOnFloors, ...]
-
-    def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
-        """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
-
-        Parameters
-        ----------
-        steps : sequence of EditableStep
-            On the soft ground, as the artist leaves them.
-        shed : mapping of int to float
-            Volume that each sheds in the air, by its number [m³].
-        """
-        carried = surfaces.sticking(self.kind).carried
-        assert carried is not None
-        films: dict[int, Array] = {}
-        booked = CarriedMass()
-        for sole in self.soles:
-            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
-            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
-            giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
-            films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
-            booked += of_sole
-        return films, booked
-
-    def _soft_meetings(
-        self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
-    ) -> Iterator[Meeting]:
-        """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
-        density = surfaces.sticking(self.kind).density
-        for step in steps:
-            if step.footprint is None or step.is_copy or (step.footprint.character, step.footprint.sole) != sole.of:
-                continue
-            if (step.footprint.surface or self.ground) == self.kind and step.footprint.end_frame < sole.last_frame:
-                yield Meeting(step.footprint.end_frame, shed=shed.get(step.index, 0.0) * density)
-
-
-@dataclass(frozen=True)
 class _Contact:
     """A contact of a sole with a hard floor: where it lies, its slide in sole lengths, frames, and what wets it."""
 
@@ -166,16 +91,13 @@ class _Contact:
     wet: str
 
 
-@dataclass(frozen=True)
-class _Mark:
-    """A mark, its faces, and the values of its vertices as `Marks` has them."""
-
-    number: int
-    faces: NDArray[np.intp]
-    values: dict[str, Any]
-
-
-_COLUMNS = ("position", "birth", "mass", "area", "sole", "tread", "share", "zone")
+_Mark = dict[str, Any]
+"""The faces of a mark, and the values of its vertices, as `Marks` has them."""
+_NOTHING: _Mark = {
+    **dict.fromkeys(("birth", "mass", "area", "tread", "share"), np.zeros(0)),
+    **dict.fromkeys(("position", "sole"), np.zeros((0, 3))),
+    **{"zone": np.zeros(0, np.intp), "faces": np.zeros((0, 4), np.intp)},
+}
 
 
 @sliced
@@ -208,10 +130,9 @@ def marks_of(
     """
     if not isinstance(terrain, HardOnSoft):
         return None
-    prints = [step.footprint for step in steps if step.footprint]
-    kinds = dict.fromkeys([surface, *(footprint.surface for footprint in prints if footprint.surface)])
-    sticking = [surfaces.sticking(kind) for kind in (*kinds, *terrain.wet)]
-    sticking = [kind for kind in sticking if kind.carried is not None]
+    prints = [step.footprint or step.baked for step in steps]
+    kinds = dict.fromkeys([surface, *(footprint.surface for footprint in prints if footprint.surface), *terrain.wet])
+    sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
     laid_out: list[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]] = []
@@ -232,7 +153,7 @@ def marks_of(
             sole = SoleOnFloors(of, _by_zone(grid, grid.area), float(character.motion.frames[-1]), dirty, (), ())
             laid_out.append((grid, contacts, sole, treads.get(of, 0.0)))
     whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
-    return max(whole, key=lambda marks: marks.carried.left_behind, default=None)
+    return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
 
 def _of_kind(
@@ -254,18 +175,15 @@ def _of_kind(
             of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)
             meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), of_zones))
             marks.append(-1 if is_wet else len(parts))
-            parts += [] if is_wet else [_mark(grid, contact, share, tread, len(parts))]
+            parts += [] if is_wet else [_mark(grid, contact, share, tread)]
         dirty = sole.dirty if kind.name == ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = FloorSteps(kind.name, ground, tuple(soles))
     at_most, _ = floors.films([replace(step, footprint=step.baked) for step in steps if not step.is_copy], {})
-    parts = [
-        part for number, part in enumerate(parts) if (at_most[number][part.values["zone"]] * part.values["share"]).any()
-    ]
-    numbers = {part.number: number for number, part in enumerate(parts)}
-    floors = replace(
-        floors, soles=tuple(replace(sole, marks=tuple(numbers.get(mark, -1) for mark in sole.marks)) for sole in soles)
-    )
+    weighs = [bool((at_most[n][part["zone"]] * part["share"]).any()) for n, part in enumerate(parts)]
+    numbers = np.append(np.where(weighs, np.cumsum(weighs) - 1, -1), -1).astype(int)
+    soles = [replace(sole, marks=tuple(numbers[list(sole.marks)].tolist())) for sole in soles]
+    parts, floors = list(compress(parts, weighs)), replace(floors, soles=tuple(soles))
     return _joined(parts, floors).with_steps(steps, shed)
 
 
@@ -306,10 +224,11 @@ def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number: int) -> _Mark:
+def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float) -> _Mark:
     """The mark of one contact that leaves a share at each node of the grid."""
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
-    values = {
+    return {
+        "faces": faces.reshape(-1, 4),
         "position": contact.laid.position[used],
         "birth": contact.frames[contact.laid.touched[used]],
         "mass": np.zeros(len(used)),
@@ -319,14 +238,11 @@ def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float, number:
         "share": share[used],
         "zone": grid.zone[used],
     }
-    return _Mark(number, faces.reshape(-1, 4), values)
 
 
 def _joined(parts: Sequence[_Mark], floors: FloorSteps) -> Marks:
-    first = np.cumsum([0, *(len(part.values["mass"]) for part in parts)])
-    none, places = np.zeros(0), np.zeros((0, 3))
-    nothing = dict.fromkeys(_COLUMNS, none) | {"position": places, "sole": places, "zone": np.zeros(0, np.intp)}
-    whole: Any = {name: np.concatenate([nothing[name], *(part.values[name] for part in parts)]) for name in _COLUMNS}
-    faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
-    faces = np.concatenate([np.zeros((0, 4), np.intp), *faces])
-    return Marks(faces=faces, step=np.repeat(np.arange(len(parts)), np.diff(first)), floors=floors, **whole)
+    counts = [len(part["mass"]) for part in parts]
+    first = np.cumsum([0, *counts])
+    parts = [part | {"faces": part["faces"] + start} for part, start in zip(parts, first, strict=False)]
+    whole: Any = {name: np.concatenate([none, *(part[name] for part in parts)]) for name, none in _NOTHING.items()}
+    return Marks(step=np.repeat(np.arange(len(parts)), np.array(counts, int)), floors=floors, **whole)

@@ -180,3 +180,13 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
         assert carried == anew.carried
         assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
         assert mass_of_steps(found).sum() == pytest.approx(carried.left_behind, abs=1e-9)
+
+
+@pytest.mark.parametrize("ground", ["sand", "snow"])
+def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
+    loads, footprints, terrain = crossing()
+    steps = steps_of([replace(step, surface="mud") for step in footprints], {}, {}, {})
+    muted = [replace(step, footprint=None) for step in steps]
+    found = marks_of([loads], muted, terrain, surface=ground)
+    assert not found.mass.any()
+    assert found.with_steps(steps, {}).mass == pytest.approx(marks().mass)

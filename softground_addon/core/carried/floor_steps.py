@@ -1,0 +1,88 @@
+"""The steps of a shot on hard floors, from which follows what marks weigh as steps on the soft ground are edited."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..ground import surfaces
+from ..numerics.arrays import Array
+from ..record.record import EditableStep
+from .film import CarriedMass, Meeting, carry
+
+
+@dataclass(frozen=True)
+class SoleOnFloors:
+    """The way of a sole over hard floors, whatever it carries.
+
+    Attributes
+    ----------
+    of : (str, str)
+        Character and sole.
+    areas : (4,) float array
+        Of its zones [m²].
+    last_frame : float
+        Of the shot.
+    dirty : float
+        Film as the shot starts, over the thickest.
+    meetings : sequence of Meeting
+        With hard floors, in the order of time.
+    marks : sequence of int
+        Number of the mark that each of these leaves; -1 of none.
+    """
+
+    of: tuple[str, str]
+    areas: Array
+    last_frame: float
+    dirty: float
+    meetings: tuple[Meeting, ...]
+    marks: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FloorSteps:
+    """Steps of all soles on hard floors: what they leave follows from these and the steps on soft ground.
+
+    Attributes
+    ----------
+    kind, ground : str
+        What they carry, and what the ground is made of where a step does not say.
+    soles : sequence of SoleOnFloors
+    """
+
+    kind: str
+    ground: str
+    soles: tuple[SoleOnFloors, ...]
+
+    def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
+        """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
+
+        Parameters
+        ----------
+        steps : sequence of EditableStep
+            On the soft ground, as the artist leaves them.
+        shed : mapping of int to float
+            Volume that each sheds in the air, by its number [m³].
+        """
+        carried = surfaces.sticking(self.kind).carried
+        assert carried is not None
+        films: dict[int, Array] = {}
+        booked = CarriedMass()
+        for sole in self.soles:
+            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
+            all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
+            giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
+            films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
+            booked += of_sole
+        return films, booked
+
+    def _soft_meetings(
+        self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
+    ) -> Iterator[Meeting]:
+        """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
+        density = surfaces.sticking(self.kind).density
+        for step in steps:
+            if step.footprint is None or step.is_copy or (step.footprint.character, step.footprint.sole) != sole.of:
+                continue
+            if (step.footprint.surface or self.ground) == self.kind and step.footprint.end_frame < sole.last_frame:
+                yield Meeting(step.footprint.end_frame, shed=shed.get(step.index, 0.0) * density)
