@@ -50,7 +50,7 @@ def test_a_fine_copy_in_edit_mode_is_named_and_stays(short_walk):
     display_mesh = baked_ground.display_mesh_of(ground)
     bpy.context.view_layer.objects.active = display_mesh
     bpy.ops.object.mode_set(mode="EDIT")
-    assert f"'{display_mesh.name}' is in Edit Mode: leave it" in refusal(bpy.ops.softground.bake)
+    assert f"'{display_mesh.name}' beside ground 'Field' is in Edit Mode: leave it" in refusal(bpy.ops.softground.bake)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert bpy.ops.softground.bake() == {"FINISHED"}
 
