@@ -29,13 +29,13 @@ def forget() -> None:
 
 
 def reused(
-    told: State, kind: str, inputs: object, work: Generator[State, None, Result], *, of: str = ""
+    progress: State, kind: str, inputs: object, work: Generator[State, None, Result], *, of: str = ""
 ) -> Generator[State, None, Result]:
     """The last result of a kind if its inputs were equal, otherwise that of the work.
 
     Parameters
     ----------
-    told : State
+    progress : State
         Yielded while the inputs are compared.
     inputs : object
         All that the result depends on; `hash_inputs` compares it.
@@ -44,7 +44,7 @@ def reused(
     of : str
         Name of one of several of a kind, of which each has its last result.
     """
-    compared = yield from meanwhile(told, hash_inputs.slices(inputs))
+    compared = yield from meanwhile(progress, hash_inputs.slices(inputs))
     if last := state.results.get((kind, of)):
         if last[0] == compared:
             result: Result = last[1]

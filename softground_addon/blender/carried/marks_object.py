@@ -111,8 +111,8 @@ def _floors(text: str) -> FloorSteps:
     soles = []
     for sole in said["soles"]:
         meetings = tuple(
-            Meeting(one["frame"], None if one["shares"] is None else np.array(one["shares"]))
-            for one in sole["meetings"]
+            Meeting(meeting["frame"], None if meeting["shares"] is None else np.array(meeting["shares"]))
+            for meeting in sole["meetings"]
         )
         fixed = {"of": tuple(sole["of"]), "areas": np.array(sole["areas"]), "meetings": meetings}
         soles.append(SoleOnFloors(**{**sole, **fixed}))

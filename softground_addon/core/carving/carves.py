@@ -38,7 +38,7 @@ FRAMES_AT_ONCE = 16
 
 @sliced
 def with_carves(
-    left: BakeRecord,
+    record: BakeRecord,
     responses: Iterable[tuple[CharacterMotion, Response]],
     skins: Mapping[str, WornSkin],
     ground: SoftGround,
@@ -54,7 +54,7 @@ def with_carves(
     surface : str
         What it is made of.
     """
-    prints = {step.index: _as_the_body_steps(step) for step in left.steps if step.footprint is not None}
+    prints = {step.index: _as_the_body_steps(step) for step in record.steps if step.footprint is not None}
     waders = {print.character for print in prints.values() if is_deep(print)}
     responded = [
         (motion.name, [sole.sole.name for sole in motion.soles], RespondedSkin(skins[motion.name], motion, response))
@@ -62,14 +62,14 @@ def with_carves(
         if motion.name in skins.keys() & waders
     ]
     if not responded:
-        return left
-    carves = yield from carves_of.slices(responded, prints, ground, surface, len(left.footprints))
-    where = {name: replace(placement(edit), shift_frames=0) for name, edit in left.edits.items()}
-    return replace(left, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
+        return record
+    carves = yield from carves_of.slices(responded, prints, ground, surface, len(record.footprints))
+    where = {name: replace(placement(edit), shift_frames=0) for name, edit in record.edits.items()}
+    return replace(record, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
 
 
 def _as_the_body_steps(step: EditableStep) -> Footprint:
-    """The print of a step that is left, when its body takes the step, which follows no edit of its time."""
+    """The remaining print of a step at the time at which its body takes it, whatever shift its edits ask for."""
     assert step.footprint is not None
     at = shifted(step.footprint, -step.edit.shift_frames) if step.edit.shift_frames else step.footprint
     return at if at.pressed_by else replace(at, pressed_by=step.baked.pressed_by)
@@ -117,9 +117,9 @@ def carves_of(
             yield
             around = next(body.poses)
             low = carving.low(around)
-            for step, left, triangles in body.parts(number):
-                if left is not None:
-                    carving.leave(left)
+            for step, behind, triangles in body.parts(number):
+                if behind is not None:
+                    carving.leave(behind)
                 if step.is_deep and (part := carving.drawn(step, around, low, triangles)) is not None:
                     drawn.append(part)
         for part in drawn:
