@@ -710,7 +710,7 @@ def alone(scene, tmp_path, frame):
 @pytest.mark.parametrize(("densest", "deepest"), [(None, 0.25), (0.4, 0.1)])
 def test_hollows_read_compression_against_what_can_be_packed(densest, deepest):
     material = {"blur_sigma": 0.005, "layer_depth": 0.25} | ({"densest": densest} if densest else {})
-    units = {"cell_size_m": 1.0, "time_stretch": 1.0}
+    units = dict.fromkeys(("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m"), 1.0)
     known, _ = weather.of_bake([], {"inputs": {**units, "surface": "soil", "material": material, "weather": None}})
     assert known["layer_depth"] == pytest.approx(deepest)
 
