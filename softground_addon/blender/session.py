@@ -73,11 +73,18 @@ def current() -> Any:
 
 
 def show_bake(progress: float, status: str) -> None:
-    """Let the panel say how far the bake is, 0 to 1, and what it is doing; nothing else is drawn."""
+    """Let the panel say how far the bake is, 0 to 1, and what it is doing; at times the viewport shows its prints."""
     state.is_baking, state.progress, state.status = True, progress, status
     redraw()
-    if state.pressing and len(state.pressing.footprints) > len(state.pressing.shapes):
+    pressing = state.pressing
+    if pressing and len(pressing.footprints) > RARER * pressing.announced:
+        pressing.announced = len(pressing.footprints)
         redraw(region_type="WINDOW")
+
+
+RARER = 4
+"""Growth in number after which the viewport is asked to draw early prints again: to draw a heavy scene may take longer
+than to press a step."""
 
 
 @dataclass
@@ -93,6 +100,8 @@ class Pressing:
     frame : GroundFrame or None
         That terrain and prints are in, instead of the world.
     footprints : list of Footprint
+    announced : int
+        Number of them when the viewport was last asked to draw.
     shapes : list
         Triangles of the first of them, as the viewport has drawn them.
     """
@@ -101,6 +110,7 @@ class Pressing:
     terrain: Terrain
     frame: GroundFrame | None
     footprints: list[Footprint] = field(default_factory=list)
+    announced: int = 0
     shapes: list[Any] = field(default_factory=list)
 
 
