@@ -9,14 +9,13 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ..core.motion.ground_frame import ALIGNED, GroundFrame
+from ..core.numerics.arrays import Array
 from ..core.rig.recording import SceneUnits
 from ..core.settings import DOWN
 from . import settings
 
-Array = NDArray[np.float64]
 Direction = tuple[float, float, float]
 
 FAR = 1000.0

@@ -10,8 +10,9 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.ground_frame import Array, GroundFrame, axes_of, rows, upright
+from ...core.motion.ground_frame import GroundFrame, axes_of, rows, upright
 from ...core.motion.ground_ride import EVEN, GroundRide
+from ...core.numerics.arrays import Array
 from ...core.numerics.rigid import unit
 from ...core.rig.recording import SceneUnits
 from ...core.settings import BakeSettings

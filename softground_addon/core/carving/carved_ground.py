@@ -7,23 +7,19 @@ from math import ceil, floor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.hard_ground import bare
 from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import TILE, SampledGrid, Window
 from ..ground.variation import VariationTiles
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.interpolation import cubic
 from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
 from .carver import REACH, CarvedCells
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""

@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.deep_ground import wading
+from ..numerics.arrays import Array, Indices, Mask
 from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder
 from .carver import Walls
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 POSES_ALONG_SOLE = 9
 """Nothing in the ground moves further from one pose to the next than this part of a sole, or a cell: 3 cm, from which

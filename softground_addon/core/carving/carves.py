@@ -12,13 +12,13 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.regions import GroundKind
 from ..ground.soft_ground import SoftGround
 from ..ground.surfaces import find
 from ..legs.grounding import Response
 from ..motion.motion import CharacterMotion
+from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
@@ -28,9 +28,6 @@ from .carved_ground import CarvedGround
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""

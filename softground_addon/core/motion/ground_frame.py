@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from .ground_ride import GroundRide
 
-Array = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
 ALIGNED = 1e-5

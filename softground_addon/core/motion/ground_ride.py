@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.smoothing_spline import smooth_path
-
-Array = NDArray[np.float64]
 
 CUTOFF = 4.0
 """Cut-off of the low-pass before accelerations are taken [Hz]: single precision shakes places."""

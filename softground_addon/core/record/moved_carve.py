@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
 from ..numerics import bilinear
+from ..numerics.arrays import Array
 from .edits import StepEdit
 from .footprints import Changes, Footprint
-
-Array = NDArray[np.float64]
 
 
 def placement(edit: StepEdit) -> StepEdit:
