@@ -74,7 +74,7 @@ def with_debris(
 
 
 @sliced
-def marks_left(
+def marks_of_record(
     record: BakeRecord,
     terrain: Terrain,
     made_with: BakeSettings,

@@ -27,7 +27,7 @@ from .. import session
 from ..jobs import Job, Progress, counted, meanwhile
 from ..reading.shots import Shot
 from ..reuse import reused
-from .publish import marks_left, with_debris
+from .publish import marks_of_record, with_debris
 
 _Stood = tuple[tuple[CharacterMotion, ...], list[CharacterLoads]]
 """From `loads_standing`."""
@@ -95,7 +95,7 @@ def _pressed(
     record = yield from meanwhile(at_end, carving)
     throwing = with_debris.slices(record, ground, wanted, pressed.loads)
     record, debris = yield from meanwhile(at_end, throwing)
-    marking = marks_left.slices(record, shot.terrain, wanted, pressed.loads, debris)
+    marking = marks_of_record.slices(record, shot.terrain, wanted, pressed.loads, debris)
     marks = yield from meanwhile(at_end, marking)
     measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, record.edited)
     gaps = yield from meanwhile(at_end, measuring)

@@ -56,7 +56,7 @@ class EditableBake:
 
     def with_edits(self, edits: Mapping[str, StepEdit]) -> BakeRecord:
         """The record with other edits in place of those that it has."""
-        return EditedSteps.left_with(self.steps, self.record, edits)
+        return EditedSteps.record_with(self.steps, self.record, edits)
 
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
@@ -94,7 +94,7 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
     ground = scene.softground.ground
     ground_checks.check_writable(ground)
     edits = {name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)}
-    pressing = EditedSteps.left_with.slices(bake.steps, bake.record, edits)
+    pressing = EditedSteps.record_with.slices(bake.steps, bake.record, edits)
     record = yield from jobs.meanwhile(jobs.Progress("simulate", 0.5), pressing)
     shown, stamp = baked_ground.display_mesh_of(ground), staleness.stamp_of(ground)
     warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)

@@ -67,7 +67,7 @@ def with_edits(
     InputError
         See `EditedSteps.pressed_again`.
     """
-    return (yield from EditedSteps.left_with.slices(EditedSteps(record.footprints, ground, cell_size), record, edits))
+    return (yield from EditedSteps.record_with.slices(EditedSteps(record.footprints, ground, cell_size), record, edits))
 
 
 class EditedSteps:
@@ -103,7 +103,7 @@ class EditedSteps:
         self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
 
     @sliced
-    def left_with(self, record: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
+    def record_with(self, record: BakeRecord, edits: Mapping[str, StepEdit]) -> Slices[BakeRecord]:
         """The record that the footprints are of, with other edits; errors as `pressed_again`."""
         again = yield from EditedSteps.pressed_again.slices(self, edits_by_number(record.footprints, edits))
         return replace(record, edits=dict(edits), pressed_again=again)

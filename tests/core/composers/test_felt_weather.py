@@ -303,6 +303,6 @@ def test_edits_one_after_the_other_end_where_all_at_once_do():
     steps = EditedSteps(left.footprints, ground_in(weather), CELL)
     now = left
     for edits in ({second: StepEdit(mute=True)}, {first: StepEdit(shift_frames=9)}, {}, wanted):
-        now = steps.left_with(now, edits)
+        now = steps.record_with(now, edits)
     assert record.dump(now) == record.dump(with_edits(left, wanted, ground_in(weather), CELL))
-    assert not steps.left_with(now, {}).pressed_again
+    assert not steps.record_with(now, {}).pressed_again
