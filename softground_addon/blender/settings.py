@@ -16,7 +16,7 @@ from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.rig.mapping import SoleSource
 from ..core.rig.recording import SceneUnits
-from ..core.settings import DOWN, BakeSettings, CharacterSettings, ObjectName, ResponseOptions
+from ..core.settings import DOWN, BakeSettings, CharacterSettings, GroundSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
 from . import ground_slots, tread_images
@@ -58,8 +58,40 @@ def exists(obj: bpy.types.Object | None) -> bool:
 
 def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
     """The hard objects of the settings that are there, each once."""
-    listed = dict.fromkeys(item.object for item in options.hard_grounds)
-    return [obj for obj in listed if exists(obj) and obj != options.ground]
+    listed, soft = dict.fromkeys(item.object for item in options.hard_grounds), grounds_of(options)
+    return [obj for obj in listed if exists(obj) and obj not in soft]
+
+
+def grounds_of(options: Any) -> list[bpy.types.Object]:
+    """The soft grounds of the settings that are there, each once; none without the first."""
+    listed = dict.fromkeys([options.ground, *(item.object for item in options.grounds)])
+    return [obj for obj in listed if exists(obj)] if exists(options.ground) else []
+
+
+def _further_grounds(options: Any, units: SceneUnits) -> tuple[GroundSettings, ...]:
+    """The soft grounds beside the first; what no preset was chosen for is made of what the first is made of."""
+    items = {item.object: item for item in reversed(options.grounds)}
+    further = []
+    for obj in grounds_of(options)[1:]:
+        item = items[obj]
+        material = item.material if item.material.is_property_set("preset") else options.material
+        further.append(
+            GroundSettings(
+                name_of(obj),
+                material.preset,
+                material.surface,
+                _material(material),
+                _painted(item.painted),
+                _calm(options, material.surface, units) if options.steps_feel_weather else None,
+                ground_slots.regions_of(obj, typed(options.length_scale)),
+                item.under,
+            )
+        )
+    return tuple(further)
+
+
+def _painted(painted: Any) -> tuple[str, str, str]:
+    return painted.stiffness, painted.layer_depth, painted.rim
 
 
 def _wet_grounds(options: Any) -> tuple[str, ...]:
@@ -70,9 +102,12 @@ def _wet_grounds(options: Any) -> tuple[str, ...]:
 
 
 def forget_deleted_ground(options: Any) -> None:
-    """Take a ground that was deleted out of the settings."""
+    """Take grounds that were deleted out of the settings."""
     if options.ground is not None and not exists(options.ground):
         options.ground = None
+    for number in reversed(range(len(options.grounds))):
+        if not exists(options.grounds[number].object):
+            options.grounds.remove(number)
 
 
 def typed(value: float) -> float:
@@ -82,7 +117,10 @@ def typed(value: float) -> float:
 
 def material_of(options: Any) -> GroundMaterial:
     """The scene's ground material as the core's type."""
-    values = options.material
+    return _material(options.material)
+
+
+def _material(values: Any) -> GroundMaterial:
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 
@@ -166,7 +204,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         surface=options.material.surface,
         material=material_of(options),
         pressure=options.pressure,
-        painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
+        painted=_painted(options.painted),
         cell_size_m=typed(options.cell_size),
         frames=frames,
         **vars(units_of(scene)),
@@ -188,7 +226,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         keep_forces=options.keep_forces,
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
-        weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
+        weather=_calm(options, options.material.surface, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
@@ -196,15 +234,16 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         under=options.under,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),
+        grounds=_further_grounds(options, units_of(scene)),
     )
 
 
-def _calm(options: Any, units: SceneUnits) -> FeltWeather:
+def _calm(options: Any, surface: str, units: SceneUnits) -> FeltWeather:
     """No weather, for steps that would feel it."""
     stretch = units.time_stretch
     span = span_of(options.frame_start * stretch, options.frame_end * stretch)
     first, last = span.first / stretch, span.last / stretch
-    return FeltWeather(surface=options.material.surface, first=first, last=last, frame_rate=units.frame_rate)
+    return FeltWeather(surface=surface, first=first, last=last, frame_rate=units.frame_rate)
 
 
 def is_prop(character: Any) -> bool:

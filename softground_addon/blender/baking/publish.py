@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import bpy
 
@@ -55,6 +56,18 @@ def at_the_end(made_with: BakeSettings) -> dict[str, float]:
     }
 
 
+READY = Progress("write", 0.95)
+"""Progress of `publish` where all is worked out, and nothing in the scene was changed yet."""
+
+
+def until_ready(publishing: Job[Any]) -> Job[None]:
+    """Run the job of a ground up to where it is `READY`."""
+    for progress in publishing:
+        yield progress
+        if progress is READY:
+            return
+
+
 @sliced
 def with_debris(
     record: BakeRecord, ground: SoftGround, made_with: BakeSettings, loads: Sequence[CharacterLoads] | None = None
@@ -80,6 +93,8 @@ def marks_of_record(
     made_with: BakeSettings,
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
+    *,
+    brought: Mapping[str, float],
 ) -> Slices[Marks | None]:
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
@@ -93,7 +108,7 @@ def marks_of_record(
             surface=made_with.surface,
             shed=shed_volumes(debris) if debris is not None else {},
             treads=dict.fromkeys(shod, made_with.tread_m),
-            brought={character.name: character.dirty_soles for character in made_with.characters},
+            brought=brought,
         )
     )
 
@@ -134,7 +149,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
         del lines, points  # they are large, and all is in the table
         yield Progress("write", 0.9)
         marks = _tread(footprints, place.position, made_with, relief)
-        yield Progress("write", 0.95)
+        yield READY
         yield from baked_ground.write(
             place,
             sample,

@@ -11,10 +11,12 @@ from ..checks.volumes import check_volumes
 from ..errors import InputError
 from ..findings import Finding
 from ..ground.deep_ground import wading
+from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
-from ..loads.estimate import CharacterLoads
+from ..loads.estimate import CharacterLoads, follows_landings
+from ..loads.shared_ground import grounds_under, loads_on
 from ..motion.motion import CharacterMotion, shortest_sole
 from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
@@ -30,19 +32,39 @@ from .simulation import simulate
 
 
 @dataclass(frozen=True)
-class PressedShot:
-    """Loads, record and responses of a shot.
+class GroundToPress:
+    """A ground of a shot.
 
     Attributes
     ----------
-    record : BakeRecord
-        Its steps, as they are and as they are edited.
+    wanted : BakeSettings
+        What it is to be baked with.
+    factors : (V, 3) float array, optional
+        What is painted on it.
+    """
+
+    wanted: BakeSettings
+    ground: SoftGround
+    factors: Array | None = None
+
+
+@dataclass(frozen=True)
+class PressedShot:
+    """Loads, records and responses of a shot.
+
+    Attributes
+    ----------
+    shares : list of list of CharacterLoads
+        What of the loads each ground bears.
+    records : list of BakeRecord
+        The steps of each ground, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
     """
 
     loads: list[CharacterLoads]
-    record: BakeRecord
+    shares: list[list[CharacterLoads]]
+    records: list[BakeRecord]
     forces: dict[str, object] | None
     responses: list[CharacterResponse]
 
@@ -57,13 +79,12 @@ def loads_standing(
 
 
 def press_shot(
-    wanted: BakeSettings,
+    grounds: Sequence[GroundToPress],
     motions: Sequence[CharacterMotion],
     standing: Sequence[CharacterMotion],
     loads: list[CharacterLoads],
-    ground: SoftGround,
+    terrain: Terrain,
     edits: Mapping[str, StepEdit],
-    factors: Array | None = None,
     seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, PressedShot]:
     """Footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
@@ -73,12 +94,14 @@ def press_shot(
 
     Parameters
     ----------
+    grounds : sequence of GroundToPress
+        All that takes prints; the settings of the first are those of the shot.
     motions, standing : sequence of CharacterMotion
         As they were read, and as they will walk.
     loads : list of CharacterLoads
         From `loads_standing`.
-    factors : (V, 3) float array, optional
-        What is painted on the ground.
+    terrain : Terrain
+        On which they were found.
     seen : list of Footprint, optional
         Takes each print as soon as its contact ends, for a preview; where bodies lean, that of the first pass.
 
@@ -94,26 +117,56 @@ def press_shot(
     BakeError
         If a footprint breaks an invariant.
     """
-    terrain, asked = ground.terrain, wanted.response
+    wanted = grounds[0].wanted
+    asked = wanted.response
+    shares = yield from _shares(grounds, standing, loads, terrain)
     if wanted.carves:
-        yield from _check_carving(wanted, loads, ground)
-    footprints, forces = yield from _simulate(wanted, loads, ground, seen)
+        for of_ground, each in zip(shares, grounds, strict=True):
+            yield from _check_carving(each.wanted, of_ground, each.ground)
+    footprints, forces = yield from _pressed(grounds, shares, seen)
     before = None
     for _ in range(LEAN_PASSES):
-        record = yield from _edited(wanted, ground, footprints, edits)
+        records = yield from _edited(grounds, footprints, edits)
         yield None
-        now = yield from leaning.slices(loads, standing, terrain, record.edited, asked)
+        now = yield from leaning.slices(loads, standing, terrain, records, asked)
         if not leans_anew(now, before):
             break
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground)
-    check_volumes(footprints, ground, factors)
-    yield None
-    record = yield from _edited(wanted, ground, footprints, edits)
-    responses = yield from responses_of.slices(loads, motions, terrain, record, asked)
-    return PressedShot(loads, record, forces, responses)
+        shares = yield from _shares(grounds, now.motions, loads, terrain)
+        footprints, forces = yield from _pressed(grounds, shares)
+    for each, of_ground in zip(grounds, footprints, strict=True):
+        check_volumes(of_ground, each.ground, each.factors)
+        yield None
+    records = yield from _edited(grounds, footprints, edits)
+    responses = yield from responses_of.slices(loads, motions, terrain, records, asked)
+    return PressedShot(loads, shares, records, forces, responses)
+
+
+def _shares(
+    grounds: Sequence[GroundToPress],
+    motions: Sequence[CharacterMotion],
+    loads: list[CharacterLoads],
+    terrain: Terrain,
+) -> Slices[list[list[CharacterLoads]]]:
+    """What of the loads each ground bears: all of it, if it is the only one."""
+    several = soft_ground(terrain)
+    if not isinstance(several, SeveralGrounds):
+        return [loads]
+    shares = []
+    for number, each in enumerate(grounds):
+        # Landings last as long as the ground needs to give way, which is another time on each.
+        models = [character.force_model for character in each.wanted.characters]
+        known = [
+            (motion, of_motion)
+            for motion, of_motion, model in zip(motions, loads, models, strict=True)
+            if number == 0 or not follows_landings(motion, model)
+        ]
+        own = yield from loads_of_shot.slices(each.wanted, motions, terrain, known)
+        shares.append([loads_on(character, grounds_under(character, several), number) for character in own])
+        yield
+    return shares
 
 
 def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
@@ -127,16 +180,42 @@ def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground
 
 
 def _edited(
-    wanted: BakeSettings, ground: SoftGround, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
-) -> Slices[BakeRecord]:
-    record = BakeRecord(footprints, {})
-    return (yield from with_edits.slices(record, edits, ground, wanted.cell_size_m)) if edits else record
+    grounds: Sequence[GroundToPress], footprints: Sequence[Sequence[Footprint]], edits: Mapping[str, StepEdit]
+) -> Slices[list[BakeRecord]]:
+    """The record of each ground, with the edits of its steps; the first has those whose steps no ground has."""
+    others = [name for of_ground in footprints[1:] for name in edits.keys() - without_step(of_ground, edits)]
+    records = []
+    for number, (each, of_ground) in enumerate(zip(grounds, footprints, strict=True)):
+        lacking = {*others} if number == 0 else {*without_step(of_ground, edits)}
+        its_edits = {name: edit for name, edit in edits.items() if name not in lacking}
+        record = BakeRecord(of_ground, {})
+        if its_edits:
+            record = yield from with_edits.slices(record, its_edits, each.ground, each.wanted.cell_size_m)
+        records.append(record)
+    return records
+
+
+def _pressed(
+    grounds: Sequence[GroundToPress], shares: Sequence[Sequence[CharacterLoads]], seen: list[Footprint] | None = None
+) -> Generator[int | None, None, tuple[list[list[Footprint]], dict[str, object] | None]]:
+    """The footprints of each ground, and the forces on all of them."""
+    results = []
+    for each, loads in zip(grounds, shares, strict=True):
+        results.append((yield from _simulate(each.wanted, loads, each.ground, len(results), len(grounds), seen)))
+    return [of_ground for of_ground, _ in results], results[0][1]
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None = None
+    wanted: BakeSettings,
+    loads: Sequence[CharacterLoads],
+    ground: SoftGround,
+    number: int,
+    count: int,
+    seen: list[Footprint] | None,
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
-    """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
+    """The footprints of one of so many grounds in the order of their first contact; on request, the force on each sole
+    at each frame [N]."""
+    before = number * (wanted.frames[1] - wanted.frames[0] + 1)
     footprints: list[Footprint] = []
     check_cell_size(loads, wanted.fineness, wanted.longest_bake_s, set_by=TIME_LIMIT)
     frames: list[float] = []
@@ -148,7 +227,7 @@ def _simulate(
         frames.append(result.frame)
         if wanted.keep_forces:
             forces.append(result.forces)
-        yield len(frames)
+        yield (before + len(frames)) // count
     footprints.sort(
         key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
     )
