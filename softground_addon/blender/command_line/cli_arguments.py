@@ -58,6 +58,10 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
         bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
     bake.add_argument("--scene", metavar="NAME", help="scene to bake, if it is not the one that the file opens with")
     bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
+    bake.add_argument(
+        "--ground", dest="grounds", action="append", default=[], metavar="NAME[=PRESET]",
+        help="a mesh to bake on, in place of those of the file; may be repeated: each takes the steps on it",
+    )  # fmt: skip
     bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
     bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
     bake.add_argument(

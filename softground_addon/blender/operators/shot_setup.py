@@ -245,11 +245,17 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     bl_label = "Clear Bake"
     bl_options = {"REGISTER", "UNDO"}
 
+    only_shown: BoolProperty(
+        name="Only the Ground Shown",
+        description="Of several grounds, leave the others and the response as they are",
+        options={"SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = settings.scene_of(context)
-        ground = scene.softground.ground
-        if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene.softground):
+        grounds = filter(None, dict.fromkeys([scene.softground.ground, *settings.grounds_of(scene.softground)]))
+        if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
         if session.current().is_live:
@@ -260,13 +266,16 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        ground = scene.softground.ground
+        shown = scene.softground.ground
+        others = [] if self.only_shown else settings.grounds_of(scene.softground)
         reuse.forget()
         with analysis.own_changes(scene):
-            if ground is not None:
+            for ground in filter(None, dict.fromkeys([shown, *others])):
                 if baked_ground.has_remains(ground):
                     baked_ground.clear(ground)
                 look.take_off(ground)
+            if self.only_shown and settings.grounds_of(scene.softground)[1:]:
+                return {"FINISHED"}
             response_job.remove_layers(scene, LayerKind.RESPONSE)
         response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
         if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on

@@ -145,8 +145,9 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
     for of_ground in wanted.of_each_ground if ground else ():
         _check_ground(of_ground)
-    for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.resolve(name), ground):
+    beside = [(name, "in Hard Ground") for name in wanted.hard_grounds]
+    for name, where in [*beside, *((name, "beside the ground") for name in wanted.soft_grounds[1:])]:
+        if fault := ground_checks.hard_fault(settings.resolve(name), ground, where):
             raise InputError(fault)
     return ground_frames.framed(scene, wanted)
 
@@ -192,9 +193,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
         soft.append(terrain)
         hard_parts += hard
     terrain, apart, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
-    shot = Shot(
-        tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*findings, *missing), wanted.frame
-    )
+    shot = Shot(tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*findings, *missing), wanted.frame)
     alone = replace(shot, motions=(), rigs=(), findings=())
     parts = [
         replace(alone, surface=surface, terrain=terrain, frame=of_ground.frame)

@@ -121,8 +121,8 @@ def press_shot(
     asked = wanted.response
     shares = yield from _shares(grounds, standing, loads, terrain)
     if wanted.carves:
-        for of_ground, each in zip(shares, grounds, strict=True):
-            yield from _check_carving(each.wanted, of_ground, each.ground)
+        for share, each in zip(shares, grounds, strict=True):
+            yield from _check_carving(each.wanted, share, each.ground)
     footprints, forces = yield from _pressed(grounds, shares, seen)
     before = None
     for _ in range(LEAN_PASSES):
@@ -199,7 +199,7 @@ def _pressed(
     grounds: Sequence[GroundToPress], shares: Sequence[Sequence[CharacterLoads]], seen: list[Footprint] | None = None
 ) -> Generator[int | None, None, tuple[list[list[Footprint]], dict[str, object] | None]]:
     """The footprints of each ground, and the forces on all of them."""
-    results = []
+    results: list[tuple[list[Footprint], dict[str, object] | None]] = []
     for each, loads in zip(grounds, shares, strict=True):
         results.append((yield from _simulate(each.wanted, loads, each.ground, len(results), len(grounds), seen)))
     return [of_ground for of_ground, _ in results], results[0][1]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..ground.hard_ground import SeveralGrounds, up_to
 from ..motion.sole_motion import SoleMotion
+from ..numerics.arrays import Array
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import runs
 from .contacts import LEAVE_HEIGHT, TOUCH_HEIGHT
@@ -51,11 +52,11 @@ def _votes(
 ) -> NDArray[np.intp]:
     """Spots of a sole over each ground, at most at a level above it, and no further below than a limit [m], (G,)."""
 
-    def numbers(part: slice) -> NDArray[np.intp]:
+    def numbers(part: slice) -> Array:
         x, y, z = np.moveaxis(spots(sole, steps[part], axes=3), -1, 0)
         under = up_to(grounds, z + limit)
         assert isinstance(under, SeveralGrounds)
-        return np.where(z - under.heights(x, y) <= level, under.numbers(x, y), NO_GROUND)
+        return np.where(z - under.heights(x, y) <= level, under.numbers(x, y), NO_GROUND).astype(float)
 
     under = in_stretches(numbers, len(steps))
     return np.array([np.count_nonzero(under == number) for number in range(len(grounds.grounds))])

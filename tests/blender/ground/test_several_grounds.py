@@ -1,13 +1,11 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
 import bpy
-import numpy as np
 import pytest
 
 from softground_addon.blender.ground import baked_ground
-from softground_addon.core.record import record
-from tests.blender import fingerprints, shots
-from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, lift
+from tests.blender import shots
+from tests.blender.ground.test_hard_ground import below, box, lift
 from tests.blender.grounds import bake, plane
 
 
@@ -42,7 +40,10 @@ def test_each_step_prints_on_the_ground_under_it(crate):
     result = bake(scene)
     floor = scene.softground.ground
     assert result.report["warnings"] == []
-    on = {ground.name: [row for row in result.report["steps"] if row["ground"] == ground.name] for ground in (floor, crate)}
+    on = {
+        ground.name: [row for row in result.report["steps"] if row["ground"] == ground.name]
+        for ground in (floor, crate)
+    }
     assert len(on["Crate"]) >= 2
     assert len(on["Field"]) >= 4
     print(on["Crate"])
