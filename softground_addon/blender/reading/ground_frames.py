@@ -76,9 +76,10 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     for other, path in zip(beside, of_others, strict=True):
         apart = np.swapaxes(axes, -1, -2) @ (path - matrices)[:, :3]
         if np.ptp(apart, axis=0).max() > STIFF * np.abs(apart).max() + rounding:
+            where = " in Hard Ground" if other in wanted.hard_grounds else ""
             raise InputError(
-                f"'{other.name}'{' in Hard Ground' if other in wanted.hard_grounds else ''} does not move as ground '{name}' does: parent it to what that is "
-                "parented to, or remove it from the list."
+                f"'{other.name}'{where} does not move as ground '{name}' does: parent it to what that is parented to, "
+                "or remove it from the list."
             )
     matrices = from_origin @ matrices
     if not np.ptp(matrices, axis=0).any():

@@ -52,7 +52,7 @@ def loads_of_shot(
 
 
 def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, grounds: Sequence[str]) -> None:
-    """Raise InputError if nothing touches the grounds of those names, or they lie overhead or in layers under a foot."""
+    """Raise InputError if nothing touches the grounds of those names, or they lie overhead or in layers underfoot."""
     place = np.concatenate(
         [
             sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
@@ -74,8 +74,8 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, grounds: 
     ]
     if any(layered):
         raise InputError(
-            f"Ground {listed(compress(grounds, layered)) or name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own."
+            f"Ground {listed(compress(grounds, layered)) or name} has several layers one above the other under the "
+            "feet, such as a bridge or an overhang: separate the layer that is walked on into an object of its own."
         )
     for character in loads:
         contacts, leg = character.contacts, character.motion.leg_length

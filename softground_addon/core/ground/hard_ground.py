@@ -114,21 +114,25 @@ class SeveralGrounds:
     grounds : tuple of MeshTerrain
         Where two lie in one plane, the first counts.
     reach : Reach
-        Up to where soles can stand on them; where none is within reach, the lowest counts.
+        Up to where soles can stand on them.
+    limit : array or None
+        A limit for each place that is looked at, from `up_to` [m]: where all within reach are above it, as where feet
+        are keyed in deep snow, the lowest counts.
     """
 
     grounds: tuple[MeshTerrain, ...]
     reach: Reach | _Lower
+    limit: Array | None = None
 
     def heights(self, x: Array, y: Array) -> Array:
         """Heights of the surface that bears at world positions [m], NaN where there is none."""
         across, along = np.broadcast_arrays(x, y)
-        limit = self.reach.at(across, along)
-        height = np.fmax.reduce([ground.heights(across, along, limit) for ground in self.grounds])
-        beyond = np.isnan(height)
-        if beyond.any():
-            of_each = [ground.heights(across[beyond], along[beyond]) for ground in self.grounds]
-            height[beyond] = np.fmin.reduce(of_each)
+        reach = self.reach.at(across, along)
+        below = reach if self.limit is None else np.minimum(reach, self.limit)
+        height = np.fmax.reduce([ground.heights(across, along, below) for ground in self.grounds])
+        if self.limit is not None and (above := np.isnan(height)).any():
+            place = across[above], along[above], reach[above]
+            height[above] = np.fmin.reduce([ground.heights(*place) for ground in self.grounds])
         return np.asarray(height)
 
     def numbers(self, x: Array, y: Array) -> NDArray[np.intp]:
@@ -168,13 +172,14 @@ class _Bare:
 
 
 def up_to(terrain: Terrain, limit: Array) -> Terrain:
-    """A terrain for arrays of places, without hard surfaces, or any of several grounds, above a limit at each, of their shape [m].
+    """A terrain for arrays of places, without hard surfaces, or further grounds, above a limit at each, of their shape
+    [m].
 
     What a sole is beside, or within by mistake, does not bear it.
     """
     if isinstance(terrain, HardOnSoft):
         return replace(terrain, reach=_Lower(terrain.reach, limit), ground=up_to(terrain.ground, limit))
-    return replace(terrain, reach=_Lower(terrain.reach, limit)) if isinstance(terrain, SeveralGrounds) else terrain
+    return replace(terrain, limit=limit) if isinstance(terrain, SeveralGrounds) else terrain
 
 
 def bare(terrain: Terrain) -> Terrain:

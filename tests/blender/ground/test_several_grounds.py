@@ -1,54 +1,316 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
+import json
+
 import bpy
+import numpy as np
 import pytest
 
+from softground_addon.blender import further_grounds, jobs, preset_files, settings
+from softground_addon.blender.baking import bake_report, clean_feet, step_edits
 from softground_addon.blender.ground import baked_ground
-from tests.blender import shots
-from tests.blender.ground.test_hard_ground import below, box, lift
-from tests.blender.grounds import bake, plane
+from softground_addon.core.record.edits import StepEdit
+from tests.blender import command_line, fingerprints, shots
+from tests.blender.ground.test_hard_ground import below, box, bytes_of, lift
+from tests.blender.grounds import as_rendered, bake, plane, refusal
+
+CRATE, DECK = "Crate", 0.2
 
 
-def over_a_crate(scene, height=0.2):
+def over_a_crate(scene):
+    """A walk that is keyed over a crate on a floor, which is the first ground."""
     rig = shots.walker(scene, frames=84)
     bpy.ops.softground.add_character()
     options = scene.softground
     options.ground, options.cell_size = plane(scene, size=9.0, vertices=200), 0.02
-    box(scene, "Crate", height)
-    lift(rig, height)
+    options.debris = options.marks = False
+    box(scene, CRATE, DECK)
+    lift(rig, DECK)
     bpy.context.view_layer.update()
 
 
 @pytest.fixture
 def crate(opened_as):
     opened_as(over_a_crate)
-    return bpy.data.objects["Crate"]
+    return bpy.data.objects[CRATE]
 
 
 def also(*objects):
-    for obj in objects:
-        bpy.context.scene.softground.grounds.add().object = obj
+    return [further_grounds.add(bpy.context.scene.softground, obj) for obj in objects][-1]
+
+
+def record_of(ground):
+    return baked_ground.record_of(ground)
 
 
 def prints_on(ground):
-    return baked_ground.record_of(ground).footprints
+    return record_of(ground).footprints
 
 
 def test_each_step_prints_on_the_ground_under_it(crate):
     scene = bpy.context.scene
     also(crate)
-    result = bake(scene)
-    floor = scene.softground.ground
+    result, floor = bake(scene), scene.softground.ground
     assert result.report["warnings"] == []
-    on = {
-        ground.name: [row for row in result.report["steps"] if row["ground"] == ground.name]
-        for ground in (floor, crate)
-    }
-    assert len(on["Crate"]) >= 2
+    on = {name: [row for row in result.report["steps"] if row["ground"] == name] for name in ("Field", CRATE)}
+    assert len(on[CRATE]) >= 2
     assert len(on["Field"]) >= 4
-    print(on["Crate"])
-    assert all(abs(row["position"][2] - 0.2) < 0.05 for row in on["Crate"])
-    assert all(row["position"][2] < 0.05 for row in on["Field"])
-    assert len(prints_on(crate)) == len(on["Crate"])
-    assert len(prints_on(floor)) == len(on["Field"])
+    assert all(abs(row["position"][2] - DECK) < 1e-3 for row in on[CRATE])
+    assert all(abs(row["position"][2]) < 1e-3 for row in on["Field"])
+    assert [len(prints_on(ground)) for ground in (floor, crate)] == [len(on["Field"]), len(on[CRATE])]
     assert not below(prints_on(floor))
+    scene.frame_set(84)
+    shown = as_rendered(baked_ground.display_mesh_of(crate))[:, 2]
+    deepest = max(step.max_depth_m for step in prints_on(crate))
+    assert DECK - shown[shown > DECK / 2].min() == pytest.approx(deepest, abs=0.005)
+
+
+def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    settings_of = ("Snow", "Mud")
+    bpy.ops.softground.load_preset(name=settings_of[0])
+    scene.softground.cell_size = 0.02
+    further_grounds.own_material(scene.softground, item)
+    for field, value in vars(preset_files.named("mud").material).items():
+        setattr(item.material, field, value)
+    item.material.surface = "mud"
+    bake(scene)
+    together = {ground: prints_on(ground) for ground in (floor, crate)}
+    events = {ground: {row["surface"] for row in baked_ground.events_of(ground)} for ground in (floor, crate)}
+    assert events == {floor: {"snow"}, crate: {"mud"}}
+    scene.softground.grounds.clear()
+    for ground, other, preset in ((floor, crate, "Snow"), (crate, floor, "Mud")):
+        scene.softground.hard_grounds.clear()
+        bpy.ops.softground.load_preset(name=preset)
+        scene.softground.cell_size, scene.softground.debris = 0.02, False
+        scene.softground.ground = ground
+        scene.softground.hard_grounds.add().object = other
+        bake(scene)
+        alone = {(step.sole, round(step.start_frame, 6)): step for step in prints_on(ground)}
+        assert len(together[ground]) == len(alone) >= 2
+        for step in together[ground]:
+            same = alone[step.sole, round(step.start_frame, 6)]
+            assert step.max_depth_m == pytest.approx(same.max_depth_m, rel=1e-6)
+            assert step.compressed_m3 == pytest.approx(same.compressed_m3, rel=1e-6)
+            assert step.rim_m3 == pytest.approx(same.rim_m3, rel=1e-6)
+
+
+def test_a_further_ground_that_nobody_walks_on_changes_nothing_bit_for_bit(walk):
+    scene = bpy.context.scene
+    scene.softground.ground, scene.softground.cell_size = plane(scene, size=9.0, vertices=200), 0.02
+    scene.softground.detail = "NEVER"
+    before = bytes_of(bake(scene).footprints)
+    deck, aside = box(scene, "Deck", 2.2, y=(-9, 9), bottom=2.0), box(scene, "Aside", 0.3, x=(11.5, 12.0), y=(-9, 9))
+    bpy.context.view_layer.update()
+    also(deck, aside)
+    result = bake(scene)
+    assert bytes_of(result.footprints) == before
+    assert result.report["warnings"] == []
+    assert not baked_ground.is_baked(deck)
+    assert not baked_ground.is_baked(aside)
+
+
+def test_walkers_below_a_bridge_are_not_on_it_whichever_ground_is_the_first(walk):
+    scene = bpy.context.scene
+    floor = scene.softground.ground = plane(scene, size=9.0, vertices=200)
+    scene.softground.cell_size, scene.softground.detail = 0.02, "NEVER"
+    item = also(box(scene, "Bridge", 2.2, y=(-9, 9), x=(-1, 1), bottom=2.0))
+    bpy.context.view_layer.update()
+    before = bytes_of(bake(scene).footprints)
+    further_grounds.choose(scene.softground, item)
+    assert scene.softground.ground.name == "Bridge"
+    assert bytes_of(bake(scene).footprints) == before
+    assert len(prints_on(floor)) >= 4
+
+
+STAIRS = {"Field": 0.0, "Stair 1": 0.1, "Stair 2": 0.2}
+
+
+def stairs(scene):
+    """A floor and two broad stairs, each an object of its own, up which the walk is keyed."""
+    rig = shots.walker(scene, frames=84)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.ground, options.cell_size = plane(scene, size=9.0, vertices=200), 0.02
+    options.debris = options.marks = False
+    for number, (low, high) in enumerate(((-2.2, -1.0), (-4.0, -2.2)), 1):
+        box(scene, f"Stair {number}", 0.1 * number, y=(low, high))
+        lift(rig, 0.1, low=-9.0, high=high)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.slow
+def test_feet_stand_on_crates_within_a_millimetre_after_clean_feet_and_sink_feet(crate):
+    scene = bpy.context.scene
+    also(crate)
+    cleaned = jobs.run(clean_feet.clean_feet(scene))
+    assert cleaned.feet["after"]["Walker"]["penetration"]["max"] < 1.0
+    assert cleaned.feet["after"]["Walker"]["float"]["max"] < 1.0
+    scene.softground.sink_feet, scene.softground.carve = True, False
+    report = bake(scene).report
+    gaps = report["gaps_mm"]["after"]["Walker"]
+    assert (gaps["penetration"]["max"], gaps["float"]["max"]) < (1.0, 1.0)
+    assert {row["ground"] for row in report["steps"]} == {"Field", CRATE}
+
+
+@pytest.mark.slow
+def test_each_step_up_the_stairs_is_on_the_stair_under_it(opened_as):
+    scene = opened_as(stairs)
+    also(*(bpy.data.objects[name] for name in STAIRS if name != "Field"))
+    result = bake(scene)
+    print(result.report["warnings"], [(row["frame_start"], row["contact"], row["ground"], row["position"]) for row in result.report["steps"]])
+    assert {row["ground"] for row in result.report["steps"]} == set(STAIRS)
+    assert all(abs(row["position"][2] - STAIRS[row["ground"]]) < 1e-3 for row in result.report["steps"])
+
+
+def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
+    scene = bpy.context.scene
+    before = fingerprints.of_file()
+    also(crate)
+    bake(scene)
+    assert baked_ground.is_baked(crate)
+    assert bpy.ops.softground.clear_bake(only_shown=True) == {"FINISHED"}
+    assert [baked_ground.is_baked(ground) for ground in settings.grounds_of(scene.softground)] == [False, True]
+    bake(scene)
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_undo_gives_all_grounds_back_by_bytes(crate):
+    also(crate)
+    bpy.ops.ed.undo_push(message="Opened")
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    bpy.ops.ed.undo_push(message="Bake")
+    assert baked_ground.is_baked(bpy.data.objects[CRATE])
+    bpy.ops.ed.undo()
+    assert fingerprints.of_file() == before
+
+
+def test_each_ground_goes_with_its_prints_into_another_file(crate, tmp_path):
+    scene, path = bpy.context.scene, str(tmp_path / "shot.blend")
+    also(crate)
+    bake(scene)
+    prints = bytes_of(prints_on(crate))
+    name = baked_ground.display_mesh_of(crate).name
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path) as (there, here):
+        here.objects = [CRATE, name]
+    for each in (CRATE, name):
+        bpy.context.scene.collection.objects.link(bpy.data.objects[each])
+    assert bytes_of(prints_on(bpy.data.objects[CRATE])) == prints
+
+
+def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    floor = scene.softground.ground
+    on_floor = bytes_of(record_of(floor).edited)
+    further_grounds.choose(scene.softground, item)
+    editable = jobs.run(step_edits.reading(scene))
+    step = editable.record.steps[0]
+    jobs.run(step_edits.editing(scene, editable, {step.name: StepEdit(strength=0.5)}))
+    shallow = record_of(crate).edited[0].max_depth_m
+    assert shallow < step.baked.max_depth_m
+    assert bytes_of(record_of(floor).edited) == on_floor
+    assert bake_report.stale_reasons(scene) == ()
+    bake(scene)
+    assert record_of(crate).edited[0].max_depth_m == shallow
+    assert not record_of(floor).edits
+
+
+def test_what_makes_one_ground_outdated_is_said_of_each(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    assert bake_report.stale_reasons(scene) == ()
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == (), "which is shown is no input"
+    scene.softground.material.youngs_modulus *= 2
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    bake(scene)
+    crate.location.z += 0.01
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(scene) == ("Another ground than 'Field' has changed",)
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == ("The mesh or the position of 'Crate' has changed",)
+
+
+def test_a_ground_that_is_shown_brings_what_is_set_for_it_and_takes_it_back(crate):
+    options = bpy.context.scene.softground
+    item = also(crate)
+    before = settings.snapshot(bpy.context.scene)
+    further_grounds.choose(options, item)
+    bpy.ops.softground.load_preset(name="Mud")
+    options.under, options.painted.rim = "NEVER", "Mine"
+    further_grounds.choose(options, item)
+    now = settings.snapshot(bpy.context.scene)
+    assert (now.ground, now.material, now.preset, now.painted) == (
+        before.ground,
+        before.material,
+        before.preset,
+        before.painted,
+    )
+    (other,) = now.grounds
+    assert (other.preset, other.surface, other.under, other.painted[2]) == ("Mud", "mud", "NEVER", "Mine")
+
+
+def test_cover_adds_a_ground_and_the_first_stays(crate):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.context.view_layer.objects.active = crate
+    crate.select_set(True)
+    assert bpy.ops.softground.cover(thickness_cm=4.0) == {"FINISHED"}
+    (item,) = options.grounds
+    assert (options.ground, item.object.name) == (floor, "Crate Cover")
+    assert item.material.layer_depth == pytest.approx(0.04)
+    assert (options.under, item.under) == ("AUTO", "NEVER")
+    item.object.location.z -= 0.04  # the walk was made for the crate
+    crate.location.z -= 0.04
+    bpy.context.view_layer.update()
+    result = bake(scene)
+    assert {row["ground"] for row in result.report["steps"]} == {"Field", "Crate Cover"}
+    assert all(row["max_depth_m"] <= 0.04 + 1e-6 for row in result.report["steps"] if row["ground"] != "Field")
+
+
+def test_the_list_is_shown_where_there_are_several_and_its_buttons_act(crate):
+    options = bpy.context.scene.softground
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    assert "Select meshes to walk on" in refusal(bpy.ops.softground.add_ground)
+    crate.select_set(True)
+    assert bpy.ops.softground.add_ground() == {"FINISHED"}
+    assert settings.grounds_of(options) == [options.ground, crate]
+    assert bpy.ops.softground.choose_ground(object=CRATE) == {"FINISHED"}
+    assert options.ground == crate
+    assert "no such" not in refusal(lambda: bpy.ops.softground.choose_ground(object="Nobody"))
+    bpy.ops.softground.remove_ground()
+    assert settings.grounds_of(options) == [crate]
+
+
+def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presses_one(crate):
+    scene = bpy.context.scene
+    also(crate)
+    assert "Live mode presses one ground" in refusal(bpy.ops.softground.live)
+    crate.keyframe_insert("location", frame=1)
+    crate.location.x = 1.0
+    crate.keyframe_insert("location", frame=40)
+    assert "'Crate' beside the ground moves" in refusal(bpy.ops.softground.bake)
+
+
+def test_the_command_line_names_several_grounds_each_with_its_preset(crate, tmp_path):
+    path, report = tmp_path / "shot.blend", tmp_path / "report.json"
+    bpy.context.scene.softground.ground = None
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    command_line.run("bake", path, "--ground", "Field=Snow", "--ground", "Crate=Mud", "--report", report)
+    result = json.loads(report.read_text())
+    assert {row["ground"] for row in result["steps"]} == {"Field", CRATE}
+    assert result["inputs"]["preset"] == "Snow"
+    assert [ground["preset"] for ground in result["inputs"]["grounds"]] == ["Mud"]
