@@ -135,7 +135,7 @@ def bake(
     layers = (yield from response_job.layers_of(wanted, shot.rigs, prints.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    published: list[Published] = []
+    published: list[Published | None] = []
     if write and wanted.output != "RESPONSE":
         to_write = [
             replace(
@@ -157,14 +157,15 @@ def bake(
             "write": finished - simulated,
             "frames_per_second": frames / (finished - started),
         },
-        playback_error_m=max((each.error for each in published), default=None),
+        playback_error_m=max((each.error for each in published if each), default=None),
         findings=[*findings, *of_responses, *refused],
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):
         result[table] = baked_ground.events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
     for each, made_with, moved in zip(published, asked.of_each_ground, movers, strict=False):
-        sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])
+        if each:
+            sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.footprint or step.baked for step in steps if not step.is_copy))
 
@@ -181,19 +182,29 @@ def _inputs(made_with: BakeSettings, shot: Shot) -> dict[str, Any]:
 
 def _write_all(
     scene: bpy.types.Scene, shot: Shot, prints: list[GroundPrints], sole_length: float
-) -> Job[tuple[list[Published], list[Finding]]]:
-    """Put the prints on their grounds; what the scene shows is changed of all of them at once, in the last step."""
-    published, findings, parts = [], [], shot.of_each_ground
+) -> Job[tuple[list[Published | None], list[Finding]]]:
+    """Put the prints on their grounds; what the scene shows is changed of all of them at once, in the last step.
+
+    Of several grounds, those without a print are as without a bake, and None is returned for them.
+    """
+    published: list[Published | None] = []
+    findings: list[Finding] = []
     writing = [
         write_prints(scene, each.made_with, part, each.record, each.debris, sole_length)
-        for each, part in zip(prints, parts, strict=True)
+        if each.record.footprints or len(prints) == 1
+        else None
+        for each, part in zip(prints, shot.of_each_ground, strict=True)
     ]
     marks = [(each.made_with, each.marks) for each in prints]
     prints.clear()
-    if len(writing) > 1:
-        for job in writing:
-            yield from until_ready(job)
+    for job in filter(None, writing if len(writing) > 1 else ()):
+        yield from until_ready(job)
     for job, (made_with, its_marks) in zip(writing, marks, strict=True):
+        if job is None:  # no step is on it
+            assert made_with.ground
+            baked_ground.clear(settings.resolve(made_with.ground))
+            published.append(None)
+            continue
         on_ground, of_ground = (yield from job) if len(writing) == 1 else jobs.run(job)
         kind = its_marks.floors.kind if its_marks else made_with.surface
         marks_object.put(on_ground.ground, its_marks, surface=kind, units=made_with)

@@ -112,7 +112,8 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     painted = shot.variation, shot.regions(wanted)  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, edits)
-    return (yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing))
+    prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing)
+    return replace(prints, grounds=(replace(prints.grounds[0], made_with=wanted),))  # those before may write otherwise
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:

@@ -93,7 +93,7 @@ class SoftGroundFurtherGround(bpy.types.PropertyGroup):
         name="Object", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=is_mesh
     )
     material: PointerProperty(name="Material", type=SoftGroundMaterial)
-    painted: PointerProperty(name="Painted", type=SoftGroundPainted)
+    painted: PointerProperty(name="Masks", type=SoftGroundPainted)
     under: UNDER
 
 

@@ -182,6 +182,18 @@ def up_to(terrain: Terrain, limit: Array) -> Terrain:
     return replace(terrain, limit=limit) if isinstance(terrain, SeveralGrounds) else terrain
 
 
+class _Through:
+    """All of a terrain for a motion that goes through it: what `up_to` leaves out counts too."""
+
+    def __init__(self, terrain: Terrain) -> None:
+        self.heights = terrain.heights
+
+
+def through(terrain: Terrain) -> Terrain:
+    """A terrain for a motion that may go through one of its several grounds, as one does that is made for a level."""
+    return _Through(terrain) if isinstance(soft_ground(terrain), SeveralGrounds) else terrain
+
+
 def bare(terrain: Terrain) -> Terrain:
     """The part of a terrain that takes prints: without what hard objects cover, or all of it."""
     return _Bare(terrain) if isinstance(terrain, HardOnSoft) else terrain

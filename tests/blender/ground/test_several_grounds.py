@@ -11,10 +11,12 @@ from softground_addon.blender.baking import bake_report, clean_feet, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
-from tests.blender.ground.test_hard_ground import below, box, bytes_of, lift
+from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, lift
 from tests.blender.grounds import as_rendered, bake, plane, refusal
 
 CRATE, DECK = "Crate", 0.2
+GRAZE = 4.0
+"""Contacts that are shorter are of a foot that swings against the edge of the crate, in it or not [frames]."""
 
 
 def over_a_crate(scene):
@@ -60,9 +62,9 @@ def test_each_step_prints_on_the_ground_under_it(crate):
     assert [len(prints_on(ground)) for ground in (floor, crate)] == [len(on["Field"]), len(on[CRATE])]
     assert not below(prints_on(floor))
     scene.frame_set(84)
-    shown = as_rendered(baked_ground.display_mesh_of(crate))[:, 2]
-    deepest = max(step.max_depth_m for step in prints_on(crate))
-    assert DECK - shown[shown > DECK / 2].min() == pytest.approx(deepest, abs=0.005)
+    x, y, z = as_rendered(baked_ground.display_mesh_of(crate)).T
+    within = (np.abs(x) < 0.45) & (y > LOW + 0.05) & (y < HIGH - 0.05) & (z > DECK / 2)
+    assert DECK - z[within].min() == pytest.approx(max(step.max_depth_m for step in prints_on(crate)), abs=0.005)
 
 
 def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
@@ -89,7 +91,7 @@ def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
         bake(scene)
         alone = {(step.sole, round(step.start_frame, 6)): step for step in prints_on(ground)}
         assert len(together[ground]) == len(alone) >= 2
-        for step in together[ground]:
+        for step in (step for step in together[ground] if step.end_frame - step.start_frame > GRAZE):
             same = alone[step.sole, round(step.start_frame, 6)]
             assert step.max_depth_m == pytest.approx(same.max_depth_m, rel=1e-6)
             assert step.compressed_m3 == pytest.approx(same.compressed_m3, rel=1e-6)
@@ -159,7 +161,6 @@ def test_each_step_up_the_stairs_is_on_the_stair_under_it(opened_as):
     scene = opened_as(stairs)
     also(*(bpy.data.objects[name] for name in STAIRS if name != "Field"))
     result = bake(scene)
-    print(result.report["warnings"], [(row["frame_start"], row["contact"], row["ground"], row["position"]) for row in result.report["steps"]])
     assert {row["ground"] for row in result.report["steps"]} == set(STAIRS)
     assert all(abs(row["position"][2] - STAIRS[row["ground"]]) < 1e-3 for row in result.report["steps"])
 
