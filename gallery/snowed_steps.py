@@ -20,13 +20,13 @@ from softground_addon.blender.ground import baked_ground
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
 
-PRESET = "Mud"
+PRESET, SNOW = "Mud", "Fresh Snow"
 FRAMES, SHOWN = 112, 104
 START = 1.5  # m along y; the walk is toward -y
 STEPS = ((-1.55, -0.35, 0.08), (-3.4, -1.55, 0.18))
 """Where each step ends and begins along the way, and its height without snow [m]."""
-HALF_WIDTH, SNOW_CM = 0.8, 6.0
-PICTURE = (960, 640)
+HALF_WIDTH, SNOW_CM = 0.8, 8.0
+PICTURE = (720, 480)
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,13 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     """Mud, two steps of stone that are covered with snow, and a walk up."""
     ground = open_air.add_ground(scene, "Yard", (-5.0, START + 2.0), open_air.rolling(0.0, 0.02, seed=5), "mud")
     scene.softground.ground = ground
+    bpy.ops.softground.load_preset(name=SNOW)  # of which covers are made; what the yard is made of follows
     for number, (end, begin, top) in enumerate(STEPS, 1):
         production.make_active(slab(scene, f"Step {number}", (end, begin), top, stone(), HALF_WIDTH))
         bpy.ops.softground.cover(thickness_cm=SNOW_CM)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (1.75, 1.35, 1.55), (-0.1, -1.0, 0.12), 30.0, (0.0, -0.6, 0.0), 11.0)
-    chosen = {"relief_vertices": "300000"} | dict(options or {})
+    chosen = {"relief_vertices": "120000"} | dict(options or {})
     return SnowedSteps({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 
 
@@ -62,7 +63,7 @@ def claims(built: SnowedSteps) -> list[Claim]:
     return [
         *(Claim(f"Prints on {ground.name}", len(each), 1, 5) for ground, each in zip(grounds, prints, strict=True)),
         Claim("Prints off the height of their ground [m]", max(off), 0.0, 0.03),
-        Claim("Deepest print over the thickness of the snow", max(deepest[1:]) / (SNOW_CM / 100), 0.3, 1.0 + 1e-6),
+        Claim("Deepest print in snow over its thickness", max(deepest[1:]) / (SNOW_CM / 100), 0.3, 1.0 + 1e-6),
         Claim("Prints on all together", len(built.bakes[PRESET].footprints), 5, 12),
     ]
 
