@@ -45,7 +45,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
         production.make_active(slab(scene, f"Step {number}", (end, begin), top, stone(), HALF_WIDTH))
         bpy.ops.softground.cover(thickness_cm=SNOW_CM)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.75, 1.35, 1.55), (-0.1, -1.0, 0.12), 30.0, (0.0, -0.6, 0.0), 11.0)
+    open_air.add_camera(scene, (1.9, 1.55, 1.6), (-0.25, -1.25, 0.4), 27.0, (0.0, -0.6, 0.0), 11.0)
     chosen = {"relief_vertices": "120000"} | dict(options or {})
     return SnowedSteps({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 
