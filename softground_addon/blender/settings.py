@@ -71,27 +71,25 @@ def grounds_of(options: Any) -> list[bpy.types.Object]:
 def _further_grounds(options: Any, units: SceneUnits) -> tuple[GroundSettings, ...]:
     """The soft grounds beside the first; what no preset was chosen for is made of what the first is made of."""
     items = {item.object: item for item in reversed(options.grounds)}
-    further = []
-    for obj in grounds_of(options)[1:]:
-        item = items[obj]
-        material = item.material if item.material.is_property_set("preset") else options.material
-        further.append(
-            GroundSettings(
-                name_of(obj),
-                material.preset,
-                material.surface,
-                _material(material),
-                _painted(item.painted),
-                _calm(options, material.surface, units) if options.steps_feel_weather else None,
-                ground_slots.regions_of(obj, typed(options.length_scale)),
-                item.under,
-            )
-        )
-    return tuple(further)
+    return tuple(
+        GroundSettings(ground=name_of(obj), **_set_for(options, units, obj, items[obj]))
+        for obj in grounds_of(options)[1:]
+    )
 
 
-def _painted(painted: Any) -> tuple[str, str, str]:
-    return painted.stiffness, painted.layer_depth, painted.rim
+def _set_for(options: Any, units: SceneUnits, ground: bpy.types.Object | None, group: Any) -> dict[str, Any]:
+    """Values of a ground, which a group of settings has for it, as `GroundSettings` and `BakeSettings` call them."""
+    material = group.material if group.material.is_property_set("preset") else options.material
+    painted = group.painted
+    return {
+        "preset": material.preset,
+        "surface": material.surface,
+        "material": _material(material),
+        "painted": (painted.stiffness, painted.layer_depth, painted.rim),
+        "weather": _calm(options, material.surface, units) if options.steps_feel_weather else None,
+        "regions": ground_slots.regions_of(ground, typed(options.length_scale)) if ground else (),
+        "under": group.under,
+    }
 
 
 def _wet_grounds(options: Any) -> tuple[str, ...]:
@@ -195,19 +193,16 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     """
     options = scene.softground
     frames, has_ground = (options.frame_start, options.frame_end), exists(options.ground)
+    units = units_of(scene)
     return BakeSettings(
         file=bpy.data.filepath,
         scene=scene.name,
         ground=name_of(options.ground) if has_ground else None,
         characters=tuple(character_of(entry) for entry in options.characters if is_set_up(entry)),
-        preset=options.material.preset,
-        surface=options.material.surface,
-        material=material_of(options),
         pressure=options.pressure,
-        painted=_painted(options.painted),
         cell_size_m=typed(options.cell_size),
         frames=frames,
-        **vars(units_of(scene)),
+        **vars(units),
         response=_response(options, grounded=grounded),
         sink_feet=options.sink_feet,
         carve=options.carve,
@@ -226,15 +221,13 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         keep_forces=options.keep_forces,
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
-        weather=_calm(options, options.material.surface, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
-        under=options.under,
-        regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),
-        grounds=_further_grounds(options, units_of(scene)),
+        **_set_for(options, units, options.ground if has_ground else None, options),
+        grounds=_further_grounds(options, units),
     )
 
 

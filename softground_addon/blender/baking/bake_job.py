@@ -197,8 +197,9 @@ def _write_all(
     ]
     marks = [(each.made_with, each.marks) for each in prints]
     prints.clear()
-    for job in filter(None, writing if len(writing) > 1 else ()):
-        yield from until_ready(job)
+    if len(writing) > 1:
+        for waiting in filter(None, writing):
+            yield from until_ready(waiting)
     for job, (made_with, its_marks) in zip(writing, marks, strict=True):
         if job is None:  # no step is on it
             assert made_with.ground

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -154,17 +155,17 @@ def _shares(
     several = soft_ground(terrain)
     if not isinstance(several, SeveralGrounds):
         return [loads]
-    shares = []
+    shares, models = [], [character.force_model for character in grounds[0].wanted.characters]
+    under = {id(character): grounds_under(character, several) for character in loads}
+    # Landings last as long as the ground needs to give way, which is another time on each.
+    same = [not follows_landings(*each) for each in zip(motions, models, strict=True)]
+    known = list(compress(zip(motions, loads, strict=True), same))
     for number, each in enumerate(grounds):
-        # Landings last as long as the ground needs to give way, which is another time on each.
-        models = [character.force_model for character in each.wanted.characters]
-        known = [
-            (motion, of_motion)
-            for motion, of_motion, model in zip(motions, loads, models, strict=True)
-            if number == 0 or not follows_landings(motion, model)
-        ]
-        own = yield from loads_of_shot.slices(each.wanted, motions, terrain, known)
-        shares.append([loads_on(character, grounds_under(character, several), number) for character in own])
+        of_ground = loads
+        if number and not all(same):
+            of_ground = yield from loads_of_shot.slices(each.wanted, motions, terrain, known)
+        on = [under[id(one)] if id(one) in under else grounds_under(one, several) for one in of_ground]
+        shares.append([loads_on(one, where, number) for one, where in zip(of_ground, on, strict=True)])
         yield
     return shares
 

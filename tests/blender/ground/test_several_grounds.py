@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import further_grounds, jobs, preset_files, settings
-from softground_addon.blender.baking import bake_report, clean_feet, step_edits
+from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
+from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.playback import weather_modifier
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
-from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, lift
+from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
+from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, curves_of, lift
 from tests.blender.grounds import as_rendered, bake, plane, refusal
 
 CRATE, DECK = "Crate", 0.2
@@ -197,7 +200,7 @@ def test_each_ground_goes_with_its_prints_into_another_file(crate, tmp_path):
     name = baked_ground.display_mesh_of(crate).name
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
-    with bpy.data.libraries.load(path) as (there, here):
+    with bpy.data.libraries.load(path) as (_, here):
         here.objects = [CRATE, name]
     for each in (CRATE, name):
         bpy.context.scene.collection.objects.link(bpy.data.objects[each])
@@ -297,7 +300,6 @@ def test_the_list_is_shown_where_there_are_several_and_its_buttons_act(crate):
 
 
 def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presses_one(crate):
-    scene = bpy.context.scene
     also(crate)
     assert "Live mode presses one ground" in refusal(bpy.ops.softground.live)
     crate.keyframe_insert("location", frame=1)
@@ -315,3 +317,74 @@ def test_the_command_line_names_several_grounds_each_with_its_preset(crate, tmp_
     assert {row["ground"] for row in result["steps"]} == {"Field", CRATE}
     assert result["inputs"]["preset"] == "Snow"
     assert [ground["preset"] for ground in result["inputs"]["grounds"]] == ["Mud"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["sails", "on_a_map"])
+def test_grounds_that_move_together_or_are_far_away_are_pressed_as_at_rest(crate, how):
+    scene = bpy.context.scene
+    also(crate)
+    before = bake(scene).report["steps"]
+    bpy.ops.softground.clear_bake()
+    hung_up(scene)
+    place = bpy.data.objects["Place"]
+    if how == "sails":
+        for frame, x in ((1, 0.0), (84, 8.3)):
+            place.location.x = x
+            place.keyframe_insert("location", index=0, frame=frame)
+        for curve in curves_of(place):
+            for key in curve.keyframe_points:
+                key.interpolation = "LINEAR"
+    else:
+        moved(scene, WHERE["on_a_map"])
+    scene.frame_set(1)
+    now = bake(scene).report["steps"]
+    assert [row["ground"] for row in now] == [row["ground"] for row in before]
+    for here, there in zip(now, before, strict=True):
+        assert here["max_depth_m"] == pytest.approx(there["max_depth_m"], abs=1e-5)
+        assert here["compressed_m3"] == pytest.approx(there["compressed_m3"], rel=1e-3)
+    assert bake_report.stale_reasons(scene) == ()
+    crate.parent = None
+    if how == "sails":
+        assert "'Crate' beside the ground stands still while 'Place' moves" in refusal(bpy.ops.softground.bake)
+
+
+def test_a_bake_that_is_closed_while_it_writes_leaves_all_grounds_as_they_were(crate):
+    scene = bpy.context.scene
+    also(crate)
+    before = fingerprints.of_file()
+    job = bake_job.bake(scene)
+    for progress in job:
+        if progress is READY:
+            break
+    next(job)
+    job.close()
+    assert fingerprints.of_file() == before
+
+
+def test_a_ground_that_no_step_is_on_any_more_is_cleared(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    assert baked_ground.is_baked(crate)
+    crate.location.x = 3.0
+    bpy.context.view_layer.update()
+    result = bake(scene)
+    assert {row["ground"] for row in result.report["steps"]} == {"Field"}
+    assert not baked_ground.has_remains(crate)
+
+
+def test_weather_and_marks_are_of_each_ground(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    floor = scene.softground.ground
+    further_grounds.choose(scene.softground, item)
+    bpy.ops.softground.add_weather()
+    modifiers = [weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) for ground in (floor, crate)]
+    assert [modifier is None for modifier in modifiers] == [True, False]
+    scene.softground.steps_feel_weather = True
+    now = settings.snapshot(scene)
+    assert (now.weather.surface, now.grounds[0].weather.surface) == ("snow", "snow")
+    assert bake(scene).report["warnings"] == []
+    assert weather_modifier.modifier_of(baked_ground.display_mesh_of(crate)) is not None
