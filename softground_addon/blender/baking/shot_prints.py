@@ -10,13 +10,15 @@ from ...core.carried.film import CarriedMass
 from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
-from ...core.composers.pressed_shot import GroundToPress, PressedShot, loads_standing, offsets_mm, press_shot
+from ...core.checks.volumes import check_volumes
+from ...core.composers.pressed_shot import PressedShot, loads_standing, offsets_mm, press_shot
 from ...core.composers.responses import CharacterResponse, gap_table
 from ...core.debris.debris import Debris
 from ...core.events.events import Event, as_edited, events, in_order
 from ...core.files import report
 from ...core.findings import Finding
 from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.estimate import CharacterLoads, follows_landings
 from ...core.motion.motion import CharacterMotion
@@ -123,16 +125,13 @@ def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
 
 def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
     at_end = Progress("simulate", 1.0)
-    grounds = [
-        GroundToPress(made_with, ground_of(made_with, part), part.surface.factors if part.surface else None)
-        for made_with, part in zip(wanted.of_each_ground, shot.of_each_ground, strict=True)
-    ]
+    grounds = list(map(ground_of, wanted.of_each_ground, shot.of_each_ground))
     seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
-    pressing = press_shot(grounds, shot.motions, *stood, shot.terrain, edits, seen)
+    pressing = press_shot(wanted, shot.motions, *stood, shot.terrain, grounds, edits, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     prints: list[GroundPrints] = []
-    for number in range(len(grounds)):
-        prints.append((yield from _of_ground(shot, pressed, number, grounds[number])))
+    for each in zip(wanted.of_each_ground, shot.of_each_ground, grounds, strict=True):
+        prints.append((yield from _of_ground(shot, pressed, len(prints), *each)))
     records, footprints = [each.record for each in prints], [step for each in prints for step in each.record.footprints]
     measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, records)
     gaps = yield from meanwhile(at_end, measuring)
@@ -147,9 +146,15 @@ def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str
     )
 
 
-def _of_ground(shot: Shot, pressed: PressedShot, number: int, pressing: GroundToPress) -> Job[GroundPrints]:
-    """The prints of one of the grounds; the first has what happens elsewhere, and what soles bring from there."""
-    at_end, made_with, ground = Progress("simulate", 1.0), pressing.wanted, pressing.ground
+def _of_ground(
+    shot: Shot, pressed: PressedShot, number: int, made_with: BakeSettings, part: Shot, ground: SoftGround
+) -> Job[GroundPrints]:
+    """The prints of one of the grounds; the first has what happens elsewhere, and what soles bring from there.
+
+    Raises BakeError if a footprint breaks an invariant.
+    """
+    at_end = Progress("simulate", 1.0)
+    check_volumes(pressed.records[number].footprints, ground, part.surface.factors if part.surface else None)
     loads, record, terrain = pressed.shares[number], pressed.records[number], shot.terrain
     responses = [(each.motion, each.response) for each in pressed.responses]
     carving = with_carves.slices(record, responses, shot.skins, ground, made_with.surface)

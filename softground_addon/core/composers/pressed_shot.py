@@ -8,7 +8,6 @@ from itertools import compress
 
 import numpy as np
 
-from ..checks.volumes import check_volumes
 from ..errors import InputError
 from ..findings import Finding
 from ..ground.deep_ground import wading
@@ -30,23 +29,6 @@ from .prediction import pressed_contacts
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
 from .shot_loads import loads_of_shot
 from .simulation import simulate
-
-
-@dataclass(frozen=True)
-class GroundToPress:
-    """A ground of a shot.
-
-    Attributes
-    ----------
-    wanted : BakeSettings
-        What it is to be baked with.
-    factors : (V, 3) float array, optional
-        What is painted on it.
-    """
-
-    wanted: BakeSettings
-    ground: SoftGround
-    factors: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -80,11 +62,12 @@ def loads_standing(
 
 
 def press_shot(
-    grounds: Sequence[GroundToPress],
+    wanted: BakeSettings,
     motions: Sequence[CharacterMotion],
     standing: Sequence[CharacterMotion],
     loads: list[CharacterLoads],
     terrain: Terrain,
+    grounds: Sequence[SoftGround],
     edits: Mapping[str, StepEdit],
     seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, PressedShot]:
@@ -95,14 +78,14 @@ def press_shot(
 
     Parameters
     ----------
-    grounds : sequence of GroundToPress
-        All that takes prints; the settings of the first are those of the shot.
     motions, standing : sequence of CharacterMotion
         As they were read, and as they will walk.
     loads : list of CharacterLoads
         From `loads_standing`.
     terrain : Terrain
         On which they were found.
+    grounds : sequence of SoftGround
+        All that takes prints, in the order of `wanted.of_each_ground`.
     seen : list of Footprint, optional
         Takes each print as soon as its contact ends, for a preview; where bodies lean, that of the first pass.
 
@@ -115,19 +98,16 @@ def press_shot(
     ------
     InputError
         If the cells are too small for the shot.
-    BakeError
-        If a footprint breaks an invariant.
     """
-    wanted = grounds[0].wanted
     asked = wanted.response
-    shares = yield from _shares(grounds, standing, loads, terrain)
+    shares = yield from _shares(wanted, standing, loads, terrain)
     if wanted.carves:
-        for share, each in zip(shares, grounds, strict=True):
-            yield from _check_carving(each.wanted, share, each.ground)
-    footprints, forces = yield from _pressed(grounds, shares, seen)
+        for of_ground in zip(wanted.of_each_ground, shares, grounds, strict=True):
+            yield from _check_carving(*of_ground)
+    footprints, forces = yield from _pressed(wanted, shares, grounds, seen)
     before = None
     for _ in range(LEAN_PASSES):
-        records = yield from _edited(grounds, footprints, edits)
+        records = yield from _edited(wanted, grounds, footprints, edits)
         yield None
         now = yield from leaning.slices(loads, standing, terrain, records, asked)
         if not leans_anew(now, before):
@@ -135,35 +115,29 @@ def press_shot(
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        shares = yield from _shares(grounds, now.motions, loads, terrain)
-        footprints, forces = yield from _pressed(grounds, shares)
-    for each, of_ground in zip(grounds, footprints, strict=True):
-        check_volumes(of_ground, each.ground, each.factors)
-        yield None
-    records = yield from _edited(grounds, footprints, edits)
+        shares = yield from _shares(wanted, now.motions, loads, terrain)
+        footprints, forces = yield from _pressed(wanted, shares, grounds)
+    records = yield from _edited(wanted, grounds, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, records, asked)
     return PressedShot(loads, shares, records, forces, responses)
 
 
 def _shares(
-    grounds: Sequence[GroundToPress],
-    motions: Sequence[CharacterMotion],
-    loads: list[CharacterLoads],
-    terrain: Terrain,
+    wanted: BakeSettings, motions: Sequence[CharacterMotion], loads: list[CharacterLoads], terrain: Terrain
 ) -> Slices[list[list[CharacterLoads]]]:
     """What of the loads each ground bears: all of it, if it is the only one."""
     several = soft_ground(terrain)
     if not isinstance(several, SeveralGrounds):
         return [loads]
-    shares, models = [], [character.force_model for character in grounds[0].wanted.characters]
+    shares, models = [], [character.force_model for character in wanted.characters]
     under = {id(character): grounds_under(character, several) for character in loads}
     # Landings last as long as the ground needs to give way, which is another time on each.
     same = [not follows_landings(*each) for each in zip(motions, models, strict=True)]
     known = list(compress(zip(motions, loads, strict=True), same))
-    for number, each in enumerate(grounds):
+    for number, made_with in enumerate(wanted.of_each_ground):
         of_ground = loads
         if number and not all(same):
-            of_ground = yield from loads_of_shot.slices(each.wanted, motions, terrain, known)
+            of_ground = yield from loads_of_shot.slices(made_with, motions, terrain, known)
         on = [under[id(one)] if id(one) in under else grounds_under(one, several) for one in of_ground]
         shares.append([loads_on(one, where, number) for one, where in zip(of_ground, on, strict=True)])
         yield
@@ -181,29 +155,35 @@ def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground
 
 
 def _edited(
-    grounds: Sequence[GroundToPress], footprints: Sequence[Sequence[Footprint]], edits: Mapping[str, StepEdit]
+    wanted: BakeSettings,
+    grounds: Sequence[SoftGround],
+    footprints: Sequence[Sequence[Footprint]],
+    edits: Mapping[str, StepEdit],
 ) -> Slices[list[BakeRecord]]:
     """The record of each ground, with the edits of its steps; the first has those whose steps no ground has."""
     others = [name for of_ground in footprints[1:] for name in edits.keys() - without_step(of_ground, edits)]
     records = []
-    for number, (each, of_ground) in enumerate(zip(grounds, footprints, strict=True)):
+    for number, (ground, of_ground) in enumerate(zip(grounds, footprints, strict=True)):
         lacking = {*others} if number == 0 else {*without_step(of_ground, edits)}
         its_edits = {name: edit for name, edit in edits.items() if name not in lacking}
         record = BakeRecord(of_ground, {})
         if its_edits:
-            record = yield from with_edits.slices(record, its_edits, each.ground, each.wanted.cell_size_m)
+            record = yield from with_edits.slices(record, its_edits, ground, wanted.cell_size_m)
         records.append(record)
     return records
 
 
 def _pressed(
-    grounds: Sequence[GroundToPress], shares: Sequence[Sequence[CharacterLoads]], seen: list[Footprint] | None = None
+    wanted: BakeSettings,
+    shares: Sequence[Sequence[CharacterLoads]],
+    grounds: Sequence[SoftGround],
+    seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, tuple[list[list[Footprint]], dict[str, object] | None]]:
     """The footprints of each ground, and the forces on all of them."""
     results: list[tuple[list[Footprint], dict[str, object] | None]] = []
-    for each, loads in zip(grounds, shares, strict=True):
-        results.append((yield from _simulate(each.wanted, loads, each.ground, len(results), len(grounds), seen)))
-    return [of_ground for of_ground, _ in results], results[0][1]
+    for of_ground in zip(wanted.of_each_ground, shares, grounds, strict=True):
+        results.append((yield from _simulate(*of_ground, len(results), len(grounds), seen)))
+    return [footprints for footprints, _ in results], results[0][1]
 
 
 def _simulate(
