@@ -11,6 +11,7 @@ from softground_addon.blender.baking import bake_job, bake_report, clean_feet, s
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.playback import weather_modifier
+from softground_addon.blender.reading import analysis
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
@@ -179,6 +180,14 @@ def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
     bake(scene)
     bpy.ops.softground.clear_bake()
     assert fingerprints.of_file() == before
+
+
+def test_the_depth_is_predicted_on_all_of_them(crate):
+    scene = bpy.context.scene
+    also(crate)
+    analysis.read(scene)
+    predicted = analysis.expected_depth(scene)
+    assert predicted == pytest.approx(bake(scene).report["totals"]["typical_depth_m"], rel=0.05)
 
 
 def test_undo_gives_all_grounds_back_by_bytes(crate):

@@ -129,6 +129,9 @@ def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot)
         "grounding.name",
         "characters.holds.name",
         "hard_grounds.name",
+        "grounds.name",
+        "grounds.material.name",
+        "grounds.painted.name",
     }  # groups that have no list
     assert seen - changing - unused == set(NO_INPUT)
 
