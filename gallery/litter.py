@@ -16,10 +16,10 @@ import numpy as np
 from sample_scenes import stage
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
-from softground_addon.blender.node_graph import NodeGraph
-from softground_addon.blender.node_modifiers import inputs_of, new_group
+from softground_addon.blender.nodes.node_graph import NodeGraph
+from softground_addon.blender.nodes.node_modifiers import inputs_of, new_group
+from softground_addon.blender.nodes.shader_graph import Colour, Graph
 from softground_addon.blender.playback.own_data import COMPRESSION, REST
-from softground_addon.blender.shader_graph import Colour, Graph
 
 GROUP = MARK = "SoftGround Litter"
 PRESSED = "softground_pressed"

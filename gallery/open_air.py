@@ -19,7 +19,7 @@ from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Colour, Graph, Socket
+from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
 NEAR, FAR = 9.0, 600.0
 """Half the width of the ground that is even, and of all of it [m]."""

@@ -20,7 +20,7 @@ from sample_scenes.character import TO_BLENDER, assign_weights
 from sample_scenes.curves import clamped_spline
 from sample_scenes.shoe import outline_width, upper
 from sample_scenes.solids import Solid, cut, ellipsoid, mesh_of, round_cone, union
-from softground_addon.blender.shader_graph import Colour, Graph, Socket
+from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
 _LEATHER, _RUBBER, _LACE = (0.105, 0.050, 0.022), (0.014, 0.013, 0.012), (0.30, 0.045, 0.02)
 _CLOTH = (0.050, 0.058, 0.066)

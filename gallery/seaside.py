@@ -8,8 +8,8 @@ import bpy
 
 from softground_addon.blender.materials.materials import ensure_material
 from softground_addon.blender.materials.surface_shaders import UP
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.blender.playback.own_data import COMPRESSION
-from softground_addon.blender.shader_graph import Graph
 
 HORIZON, HALFWAY, ZENITH = (0.96, 0.60, 0.40), (0.62, 0.62, 0.68), (0.15, 0.28, 0.52)
 """Colours of the sky: at the horizon, at 8 degrees and from 30 degrees on."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from softground_addon.blender.materials import surface_shaders
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.surfaces import SURFACES
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.weather import weather
-from ..node_graph import NodeGraph, Number
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import new_group
 
 GROUP = "SoftGround Marks"
 VERSION = 2

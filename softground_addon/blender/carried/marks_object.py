@@ -22,7 +22,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import marks_nodes as nodes
 from .marks_material import material_for

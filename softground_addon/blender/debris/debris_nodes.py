@@ -15,8 +15,8 @@ from typing import Any
 
 import bpy
 
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import new_group
 
 GROUP = "SoftGround Debris"
 MARK = "softground_debris"

@@ -19,7 +19,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on, matrix_in
 from ..settings import find, name_of
 from . import debris_nodes as nodes

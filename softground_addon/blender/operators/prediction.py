@@ -14,10 +14,10 @@ import bpy
 
 from ...core.composers.prediction import matching_modulus, next_modulus
 from ...core.errors import InputError
-from ...core.ground.deep_ground import wading
 from ...core.loads.cell_limits import Fineness
 from ...core.motion.motion import shortest_sole
 from ...core.settings import BakeSettings
+from ...core.soles.deep_ground import wading
 from .. import jobs, session, settings
 from ..live import live
 from ..reading import analysis

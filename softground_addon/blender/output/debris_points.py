@@ -11,8 +11,8 @@ import bpy
 from .. import compat, settings
 from ..debris import debris_nodes as nodes
 from ..debris import debris_object
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import new_group
 
 
 @contextmanager

@@ -7,10 +7,9 @@ from typing import Any
 import bpy
 
 from .. import settings
-from ..ground import baked_ground
+from ..ground import baked_ground, baked_steps
+from ..ground.baked_steps import BakedStep
 from ..live import live
-from ..operators import baked_steps
-from ..operators.baked_steps import BakedStep
 from ..operators.panel_base import SidebarPanel
 from ..translation import translated
 

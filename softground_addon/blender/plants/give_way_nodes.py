@@ -16,8 +16,8 @@ from typing import Any
 import bpy
 
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
-from ..node_graph import NodeGraph, Number
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import new_group
 
 GROUP = "SoftGround Give Way"
 MARK = "softground_give_way"

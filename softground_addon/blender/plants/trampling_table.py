@@ -13,7 +13,7 @@ from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
 from .. import compat
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import modifier_with
+from ..nodes.node_modifiers import modifier_with
 from ..placement import hang_on
 from . import give_way_nodes as nodes
 

@@ -15,7 +15,7 @@ from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import modifier_with
+from ..nodes.node_modifiers import modifier_with
 from ..settings import find, name_of, resolve
 from . import own_data
 from . import playback_nodes as nodes

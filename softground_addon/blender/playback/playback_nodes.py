@@ -16,8 +16,8 @@ import bpy
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import new_group
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"

@@ -18,7 +18,7 @@ from typing import Any
 from ...core.weather import weather as w
 from ...core.weather.weather import MOMENTS, NO_WATER, PARTS, Span
 from ...core.weather.weather_places import LEAST_RANGE
-from ..node_graph import NodeGraph, Number
+from ..nodes.node_graph import NodeGraph, Number
 
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
 

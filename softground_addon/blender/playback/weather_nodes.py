@@ -20,8 +20,8 @@ import bpy
 from ...core.weather import weather as w
 from ...core.weather.weather import Matter, Span
 from ...core.weather.weather_places import BOUNDS, COVERED, NEAR, POWERS
-from .. import node_graph
-from ..node_graph import NodeGraph, Number
+from ..nodes import node_graph
+from ..nodes.node_graph import NodeGraph, Number
 from . import weather_table
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import ENDLESS, HOLLOWS, TABLE, CourseNodes

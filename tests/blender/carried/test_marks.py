@@ -8,10 +8,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
+from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import exports
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.surfaces import CARRIED_KINDS

@@ -9,9 +9,9 @@ import pytest
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from softground_addon.blender import session
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.live import live
-from softground_addon.blender.operators import baked_steps, modal_job
+from softground_addon.blender.operators import modal_job
 from softground_addon.blender.operators.modal_job import ModalJob
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state

@@ -12,7 +12,7 @@ from mathutils.bvhtree import BVHTree
 from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.node_modifiers import inputs_of
+from softground_addon.blender.nodes.node_modifiers import inputs_of
 from softground_addon.blender.plants import give_way_nodes, trampling_table
 from softground_addon.blender.playback import own_data
 from softground_addon.core.plants.bending import MOST_LASTING, PLANTS

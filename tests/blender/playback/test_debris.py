@@ -15,11 +15,12 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers, settings
+from softground_addon.blender import compat, jobs, mesh_arrays, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.debris import debris_object, debris_shapes
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import exports, image_exports
 from softground_addon.core.debris import flight
 from softground_addon.core.ground.surfaces import SURFACES

@@ -19,8 +19,8 @@ from ...core.record.contact_steps import PressingSole, Steps
 from ...core.record.edits import UNCHANGED, StepEdit, feet, sole_of
 from ...core.record.footprints import Footprint
 from .. import session
-from ..ground import baked_ground
 from ..state import state
+from . import baked_ground
 
 APART = 1.2
 """How far ahead of a step its copy lies, in lengths of its outline."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .compat import write_input
+from ..compat import write_input
 
 
 def new_group(name: str, mark: str) -> Any:
