@@ -79,7 +79,7 @@ def ensure_group() -> Any:
         (density, "Density"),
         (seed, "Seed"),
     ):
-        graph.link(source, next(one for one in strewn.inputs if one.name == name and one.enabled))
+        graph.link(source, next(each for each in strewn.inputs if each.name == name and each.enabled))
 
     pressed = graph.node("ShaderNodeMapRange", interpolation_type="SMOOTHSTEP")
     for source, index in ((graph.attribute(COMPRESSION), 0), (TOUCHED, 1), (BURIED, 2)):
@@ -116,16 +116,16 @@ def ensure_group() -> Any:
 def _random(graph: NodeGraph, seed: Any, number: int) -> Any:
     """A number from 0 to 1 for each piece."""
     node = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
-    graph.link(graph.math("ADD", seed, 100.0 * number), next(one for one in node.inputs if one.name == "Seed"))
-    return graph.number(next(one for one in node.outputs if one.enabled))
+    graph.link(graph.math("ADD", seed, 100.0 * number), next(each for each in node.inputs if each.name == "Seed"))
+    return graph.number(next(output for output in node.outputs if output.enabled))
 
 
 def _size(graph: NodeGraph, chosen: Any, seed: Any) -> Any:
     """Sizes by a power law between the smallest and the largest [m]."""
     smallest, law = graph.number(chosen["Smallest"]), graph.number(chosen["Law"])
     ratio = graph.number(graph.math("POWER", (smallest / graph.number(chosen["Largest"])).socket, law.socket))
-    left = 1.0 - _random(graph, seed, 5) * (1.0 - ratio)
-    return smallest * graph.number(graph.math("POWER", left.socket, graph.math("DIVIDE", -1.0, law.socket)))
+    still = 1.0 - _random(graph, seed, 5) * (1.0 - ratio)
+    return smallest * graph.number(graph.math("POWER", still.socket, graph.math("DIVIDE", -1.0, law.socket)))
 
 
 def strew(ground: bpy.types.Object, pieces: bpy.types.Collection, density: float | str, **values: Any) -> Any:
@@ -168,10 +168,10 @@ def material(name: str, dark: Colour, light: Colour, roughness: float, through: 
     made = stage.plain_material(f"SoftGround Sample {name}", light, roughness)
     graph = Graph(made.node_tree)
     shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    one = graph.out(graph.node("ShaderNodeObjectInfo"), 5)
+    seed = graph.out(graph.node("ShaderNodeObjectInfo"), 5)
     pressed = graph.out(graph.node("ShaderNodeAttribute", attribute_type="INSTANCER", attribute_name=PRESSED), 2)
     soiled = tuple(0.35 * part for part in dark)
-    colour = graph.mix(pressed * 0.85, graph.mix(one, dark, light), soiled)
+    colour = graph.mix(pressed * 0.85, graph.mix(seed, dark, light), soiled)
     made.node_tree.links.new(colour.output, shader.inputs["Base Color"])
     if through:
         shines = graph.node("ShaderNodeBsdfTranslucent", {0: colour})

@@ -175,8 +175,8 @@ def _eyelets(foot: Foot) -> tuple[Array, NDArray[np.intp]]:
         across = _on_upper(foot, rows, np.full(len(rows), 0.5 + side * (_LACE_REACH + 0.01)), 0.0) - middle
         ahead, across = (way / np.linalg.norm(way, axis=1, keepdims=True) for way in (ahead, across))
         rings += [
-            (at + 0.0036 * (np.cos(around)[:, None] * one + np.sin(around)[:, None] * other), 0.0013)
-            for at, one, other in zip(middle, ahead, across, strict=True)
+            (at + 0.0036 * (np.cos(around)[:, None] * each + np.sin(around)[:, None] * other), 0.0013)
+            for at, each, other in zip(middle, ahead, across, strict=True)
         ]
     return litter.tubes(rings, 6, taper=1.0)
 

@@ -286,12 +286,12 @@ def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
     prepare(scene, "created")
     result = jobs.run(bake_job.bake(scene, write=False))
     first = min(step["frame_start"] for step in result.report["steps"])
-    told = []
-    operator = SimpleNamespace(report=lambda _kind, text: told.append(text), _is_first=False)
+    reports = []
+    operator = SimpleNamespace(report=lambda _kind, text: reports.append(text), _is_first=False)
     for frame in (int(first) - 1, int(first) + 1):
         scene.frame_set(frame)
         modal_bake.SOFTGROUND_OT_bake._show(operator, result)
-    assert [text.endswith(". Press Play to see them") for text in told if "steps" in text] == [True, False]
+    assert [text.endswith(". Press Play to see them") for text in reports if "steps" in text] == [True, False]
 
 
 def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):
