@@ -201,9 +201,9 @@ def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
     work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
     if state.analyses.get(uid) is analysis:
-        state.analyses[uid] = analysis = replace(analysis, contacts=contacts)
+        state.analyses[uid] = renewed = replace(analysis, contacts=contacts)
         state.depths.clear()
-        state.depths[_key(wanted, analysis)] = contacts.typical
+        state.depths[_key(wanted, renewed)] = contacts.typical
 
 
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:

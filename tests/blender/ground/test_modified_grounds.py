@@ -18,13 +18,13 @@ def lift_by_scene_time(ground, _scene):
         inner.nodes.new(kind)
         for kind in ("GeometryNodeSetPosition", "GeometryNodeInputSceneTime", "ShaderNodeCombineXYZ")
     )
-    for modifier, other in (
+    for source, target in (
         (inner_given, place.inputs["Geometry"]),
         (time.outputs["Seconds"], up.inputs["Z"]),
         (up.outputs[0], place.inputs["Offset"]),
         (place.outputs[0], inner_result),
     ):
-        inner.links.new(modifier, other)
+        inner.links.new(source, target)
     nested = tree.nodes.new("GeometryNodeGroup")
     nested.node_tree = inner
     tree.links.new(given, nested.inputs[0])

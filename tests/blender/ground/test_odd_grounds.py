@@ -64,7 +64,7 @@ def scatter_by_nodes(ground):
     points.inputs["Density"].default_value = 1.0
     stones = tree.nodes.new("GeometryNodeInstanceOnPoints")
     both = tree.nodes.new("GeometryNodeJoinGeometry")
-    for first, other in (
+    for source, target in (
         (given, points.inputs["Mesh"]),
         (points.outputs["Points"], stones.inputs["Points"]),
         (stone.outputs["Geometry"], stones.inputs["Instance"]),
@@ -72,7 +72,7 @@ def scatter_by_nodes(ground):
         (stones.outputs["Instances"], both.inputs[0]),
         (both.outputs[0], result),
     ):
-        tree.links.new(first, other)
+        tree.links.new(source, target)
     ground.modifiers.new("Scatter", "NODES").node_group = tree
 
 

@@ -185,7 +185,7 @@ def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(
     assert {step.surface for step in bake(four).footprints} == {"soil", "sand", "mud"}
     bpy.ops.softground.clear_bake()
     assert [slot.material for slot in ground.material_slots] == theirs
-    assert [their.softground_preset for their in theirs] == list(PRESETS)
+    assert [slot.softground_preset for slot in theirs] == list(PRESETS)
 
 
 def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset(four):

@@ -58,9 +58,9 @@ def test_a_ground_below_a_bridge_is_pressed_bit_for_bit_as_without_it():
         pressed(each, SNOW, terrain=terrain) for each, terrain in zip(loads, (None, bridge), strict=True)
     )
     assert len(without) == len(below) > 4
-    for value, other in zip(without, below, strict=True):
-        assert value.compression.amounts.tobytes() == other.compression.amounts.tobytes()
-        assert value.rim.amounts.tobytes() == other.rim.amounts.tobytes()
+    for footprint, other in zip(without, below, strict=True):
+        assert footprint.compression.amounts.tobytes() == other.compression.amounts.tobytes()
+        assert footprint.rim.amounts.tobytes() == other.rim.amounts.tobytes()
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.5])
