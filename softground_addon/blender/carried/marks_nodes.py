@@ -63,8 +63,7 @@ def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     assert surface.carried is not None
     graph = NodeGraph(new_group(GROUP, MARK))
     geometry, sliders = _inputs(graph, surface)
-    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
-    age = (graph.number(frame) - graph.number(graph.attribute(BIRTH))) / frame_rate
+    age = (graph.number(graph.frame()) - graph.number(graph.attribute(BIRTH))) / frame_rate
     is_none = graph.compare("LESS_THAN", graph.attribute(MASS), 0.0)
     geometry = graph.without(geometry, graph.either(graph.compare("LESS_THAN", age.socket, 0.0), is_none))
     passed = age * sliders["Time Scale"]

@@ -69,8 +69,7 @@ def build(
     graph = _Graph()
     geometry, wind, amount, shaped, collection = graph.inputs(shapes)
     geometry = _thinned(graph, geometry, amount)
-    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
-    since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
+    since = graph.math("DIVIDE", graph.math("SUBTRACT", graph.frame(), graph.attribute(BIRTH)), frame_rate)
     geometry = graph.store(geometry, AGE, since, True)
     geometry = _moved(graph, geometry, wind, gravity=gravity, unit_scale=unit_scale)
     geometry = graph.forgotten(geometry, BIRTH, DRAG, START, LAUNCH)
@@ -101,9 +100,8 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
     remaining = graph.math("EXPONENT", graph.math("DIVIDE", graph.math("MULTIPLY", time, -1.0), drag))
     passed = graph.math("MULTIPLY", drag, graph.math("SUBTRACT", 1.0, remaining))
     launch = graph.attribute(LAUNCH, "FLOAT_VECTOR")
-    fall = graph.node("ShaderNodeCombineXYZ")
-    graph.link(graph.math("MULTIPLY", drag, -gravity / unit_scale), fall.inputs["Z"])
-    drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall.outputs["Vector"])
+    fall = graph.combined(0.0, 0.0, graph.math("MULTIPLY", drag, -gravity / unit_scale))
+    drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall)
     moved = graph.vector("ADD", graph.scaled(launch, passed), graph.scaled(drift, graph.math("SUBTRACT", time, passed)))
     speed = graph.vector(
         "ADD", graph.scaled(launch, remaining), graph.scaled(drift, graph.math("SUBTRACT", 1.0, remaining))
@@ -119,35 +117,29 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
 
 def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
     """The small ones as round points."""
-    points = graph.node("GeometryNodeMeshToPoints")
-    graph.link(geometry, points.inputs["Mesh"])
-    graph.link(graph.attribute(SMALL, "BOOLEAN"), points.inputs["Selection"])
-    graph.link(graph.attribute(RADIUS), points.inputs["Radius"])
-    return graph.shown(points.outputs["Points"], material)
+    inputs = {"Mesh": geometry, "Selection": graph.attribute(SMALL, "BOOLEAN"), "Radius": graph.attribute(RADIUS)}
+    return graph.shown(graph.node("GeometryNodeMeshToPoints", inputs).outputs["Points"], material)
 
 
 def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> Any:
     """Some points as instances of shapes, which turn as long as they fly, and come to lie on their flat side."""
-    info = graph.node("GeometryNodeCollectionInfo")
-    info.inputs["Separate Children"].default_value = True
-    info.inputs["Reset Children"].default_value = True
-    graph.link(collection, info.inputs["Collection"])
+    children = {"Collection": collection, "Separate Children": True, "Reset Children": True}
+    shapes = graph.node("GeometryNodeCollectionInfo", children).outputs[0]
     time = graph.math("MINIMUM", graph.attribute(AGE), graph.attribute(FLIGHT))
     remaining = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
     heading = graph.random((0.0, 0.0, 0.0), (0.0, 0.0, 2 * pi), 4, "FLOAT_VECTOR")
-    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), remaining), heading)
-    on_points = graph.node("GeometryNodeInstanceOnPoints")
-    on_points.inputs["Pick Instance"].default_value = True
-    for source, socket in (
-        (geometry, "Points"),
-        (selection, "Selection"),
-        (info.outputs[0], "Instance"),
-        (graph.random(0, 100, 3, "INT"), "Instance Index"),
-        (turn, "Rotation"),
-        (graph.attribute(RADIUS), "Scale"),
-    ):
-        graph.link(source, on_points.inputs[socket])
-    return on_points.outputs["Instances"]
+    turns = graph.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, 0, "FLOAT_VECTOR")
+    turn = graph.vector("ADD", graph.scaled(turns, remaining), heading)
+    inputs = {
+        "Points": geometry,
+        "Selection": selection,
+        "Instance": shapes,
+        "Pick Instance": True,
+        "Instance Index": graph.random(0, 100, 3, "INT"),
+        "Rotation": turn,
+        "Scale": graph.attribute(RADIUS),
+    }
+    return graph.node("GeometryNodeInstanceOnPoints", inputs).outputs["Instances"]
 
 
 class _Graph(NodeGraph):
@@ -175,14 +167,10 @@ class _Graph(NodeGraph):
         group = self.node("NodeGroupInput")
         return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
 
-    def shown(self, geometry: Any, material: Any, selection: Any = None) -> Any:
+    def shown(self, geometry: Any, material: Any, selection: Any = True) -> Any:
         """Geometry with a material on some or all of it."""
-        node = self.node("GeometryNodeSetMaterial")
-        self.link(geometry, node.inputs["Geometry"])
-        node.inputs["Material"].default_value = material
-        if selection is not None:
-            self.link(selection, node.inputs["Selection"])
-        return node.outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Selection": selection, "Material": material}
+        return self.node("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
 
     def has_look(self, number: int) -> Any:
         """Return whether a point has a look of several."""
@@ -206,6 +194,3 @@ class _Graph(NodeGraph):
         for name, value in (("Min", low), ("Max", high), ("Seed", seed)):
             self.link(value, next(socket for socket in sockets if socket.name == name))
         return next(socket for socket in node.outputs if socket.enabled)
-
-    def random_turn(self, seed: int) -> Any:
-        return self.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, seed, "FLOAT_VECTOR")

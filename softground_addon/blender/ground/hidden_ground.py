@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import bpy
 
-from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.layer_curves import animated_paths
 from . import ground_mesh, ground_surface
 
 WAS_HIDDEN = "softground_was_hidden"

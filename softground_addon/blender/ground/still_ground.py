@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.layer_curves import animated_paths
 from ..compat import node_inputs
 from ..nodes.node_modifiers import named_by_nodes, nodes_of
 from . import ground_mesh

@@ -106,7 +106,7 @@ class _Table:
 
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
-    frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+    frame = graph.number(graph.frame())
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
     table = _table(graph, chosen["Table"])
     graph.next_row()
@@ -117,7 +117,7 @@ def _fill(graph: NodeGraph) -> None:
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
-    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+    position = graph.position()
     root = _at(graph, position, first, "POINT")
     geometry = _stored(graph, given, "CURVE", root, latest, moved)
     geometry = _put(graph, table, geometry, "CURVE", position)
@@ -136,11 +136,9 @@ def _fill(graph: NodeGraph) -> None:
 
 
 def _table(graph: NodeGraph, obj: Any) -> _Table:
-    info = graph.node("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    graph.link(obj, info.inputs["Object"])
+    info = graph.node("GeometryNodeObjectInfo", {"Object": obj}, transform_space="RELATIVE")
     vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
-    inverted = graph.node("FunctionNodeInvertMatrix")
-    graph.link(to_scatter, inverted.inputs["Matrix"])
+    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter})
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
@@ -150,26 +148,20 @@ def _table(graph: NodeGraph, obj: Any) -> _Table:
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
-    node = graph.node("FunctionNodeTransformDirection")
-    graph.link(direction, node.inputs["Direction"])
-    graph.link(by, node.inputs["Transform"])
-    return node.outputs["Direction"]
+    inputs = {"Direction": direction, "Transform": by}
+    return graph.node("FunctionNodeTransformDirection", inputs).outputs["Direction"]
 
 
 def _at(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOAT_VECTOR") -> Any:
     """Value of a field at one of the elements of the geometry that it is of."""
-    node = graph.node("GeometryNodeFieldAtIndex", data_type=kind, domain=domain)
-    graph.link(value, node.inputs["Value"])
-    graph.link(index, node.inputs["Index"])
-    return node.outputs["Value"]
+    inputs = {"Value": value, "Index": index}
+    return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
 
 
 def _in_cells(graph: NodeGraph, table: _Table) -> Any:
     """The root in cells of the table."""
-    node = graph.node("FunctionNodeTransformPoint")
-    graph.link(graph.attribute(_ROOT, "FLOAT_VECTOR"), node.inputs["Vector"])
-    graph.link(table.from_scatter, node.inputs["Transform"])
-    return node.outputs["Vector"]
+    inputs = {"Vector": graph.attribute(_ROOT, "FLOAT_VECTOR"), "Transform": table.from_scatter}
+    return graph.node("FunctionNodeTransformPoint", inputs).outputs["Vector"]
 
 
 def _bent_passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> Any:
@@ -290,22 +282,19 @@ def _put(graph: NodeGraph, table: _Table, geometry: Any, domain: str, position: 
 def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
     toward, angle, shift = _lean_and_shift(graph, table)
-    turned = graph.node("FunctionNodeRotateVector")
-    graph.link((0.0, 0.0, 1.0), turned.inputs["Vector"])
-    graph.link(graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"], turned.inputs["Rotation"])
+    own_rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
+    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": own_rotation})
     stem = graph.choose("VECTOR", chosen["Stands"], table.up, turned.outputs["Vector"])
     to_lie = graph.number(graph.math("ARCCOSINE", graph.dot(stem, toward)))
-    rotation = graph.node("FunctionNodeAxisAngleToRotation")
-    graph.link(graph.vector("CROSS_PRODUCT", stem, toward), rotation.inputs["Axis"])
-    graph.link((angle * to_lie / (pi / 2)).socket, rotation.inputs["Angle"])
-    rotated, moved = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
-    for node, name, value in ((rotated, "Rotation", rotation.outputs["Rotation"]), (moved, "Translation", shift)):
-        node.inputs["Local Space"].default_value = False
-        graph.link(geometry, node.inputs["Instances"])
-        graph.link(graph.attribute(_TOUCHED, "BOOLEAN"), node.inputs["Selection"])
-        graph.link(value, node.inputs[name])
-        geometry = node.outputs["Instances"]
-    graph.link(graph.attribute(_ROOT, "FLOAT_VECTOR"), rotated.inputs["Pivot Point"])
+    to_ground = {
+        "Axis": graph.vector("CROSS_PRODUCT", stem, toward),
+        "Angle": (angle * to_lie / (pi / 2)).socket,
+    }
+    rotation = graph.node("FunctionNodeAxisAngleToRotation", to_ground).outputs["Rotation"]
+    pivot = {"Rotation": rotation, "Pivot Point": graph.attribute(_ROOT, "FLOAT_VECTOR")}
+    for kind, change in (("Rotate", pivot), ("Translate", {"Translation": shift})):
+        touched = {"Instances": geometry, "Selection": graph.attribute(_TOUCHED, "BOOLEAN"), "Local Space": False}
+        geometry = graph.node(f"GeometryNode{kind}Instances", touched | change).outputs["Instances"]
     return geometry
 
 
@@ -314,8 +303,7 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
 
     What each sum takes is stored first: a sum within another is worked out twice.
     """
-    parts = graph.node("GeometryNodeSeparateComponents")
-    graph.link(geometry, parts.inputs["Geometry"])
+    parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": geometry})
     island = graph.node("GeometryNodeInputMeshIsland").outputs["Island Index"]
     mesh = graph.store(parts.outputs["Mesh"], _PART, island, True, "INT")
     part, low = graph.attribute(_PART, "INT"), graph.attribute(_LOW)

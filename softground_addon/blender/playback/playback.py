@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...core.numerics.arrays import Array, Indices
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
+from .. import mesh_arrays
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import modifier_with
@@ -203,12 +204,7 @@ def _table_object(lines: PlaybackCurves, position: NDArray[np.float32]) -> bpy.t
         splines.add_curves(lines.size.tolist())
         attribute: Any = splines.attributes["position"]
         attribute.data.foreach_set("vector", position.ravel())
-    _store(splines, nodes.CONTACT, "FLOAT", lines.contact.unpacked())
+    mesh_arrays.add_attributes(splines, [(nodes.CONTACT, "FLOAT", lines.contact.unpacked())])
     if len(lines.size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
-
-
-def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:
-    attribute: Any = geometry.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set("value", values)

@@ -125,9 +125,8 @@ class _KeyframeTables:
     """Values of the keyframe_tables of vertices at a place along their splines."""
 
     def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
-        info = graph.node("GeometryNodeObjectInfo")
-        info.inputs["Object"].default_value = table
-        self._graph, self._splines, self._length = graph, info.outputs["Geometry"], length
+        splines = graph.node("GeometryNodeObjectInfo", {"Object": table}).outputs["Geometry"]
+        self._graph, self._splines, self._length = graph, splines, length
         self._number = graph.attribute(SPLINE, "INT")
 
     def movement(self) -> tuple[Any, Any]:
@@ -163,4 +162,4 @@ class _Graph(NodeGraph):
         direction.description = "World up in the ground's space, one metre long"
         group = self.node("NodeGroupInput")
         self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
-        return group.outputs["Geometry"], self.node("GeometryNodeInputSceneTime").outputs["Frame"]
+        return group.outputs["Geometry"], self.frame()

@@ -110,7 +110,7 @@ class CourseNodes:
         table: Any,
     ) -> None:
         self.graph, self._matter, self._soaking = graph, matter, soaking
-        self.frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+        self.frame = graph.number(graph.frame())
         self._first, self._step = self._value(FIRST, span.first), self._value(STEP, span.step)
         keyed, none = self._value(KEYED, 0.0), graph.number(0.0)
         self.acts = {name: said[name].at_least(0.0) + keyed for name in SUMMED}

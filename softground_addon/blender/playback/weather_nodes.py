@@ -324,16 +324,15 @@ class _Vertices:
     def _relief(self) -> Number:
         """Height of a vertex over its place at rest [m]."""
         graph, up = self._graph, self._up
-        position = graph.node("GeometryNodeInputPosition").outputs["Position"]
-        moved = graph.vector("SUBTRACT", position, graph.attribute(REST, "FLOAT_VECTOR"))
+        moved = graph.vector("SUBTRACT", graph.position(), graph.attribute(REST, "FLOAT_VECTOR"))
         metre = sum(part * part for part in up)
         return graph.number(graph.dot(moved, tuple(part / metre for part in up)))
 
-    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number, selection: Any = True) -> Any:
+    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number) -> Any:
         """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
         graph, changed = self._graph, geometry
         for name, value in values.items():
-            changed = graph.store(changed, name, value.socket, selection)
+            changed = graph.store(changed, name, value.socket, True)
         return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).socket, geometry, changed)
 
 
