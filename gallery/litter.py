@@ -6,7 +6,7 @@ pieces are strewn over the undisturbed ground, so that none jumps while it moves
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import pi
 from typing import Any
 
@@ -17,7 +17,7 @@ from sample_scenes import stage
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
 from softground_addon.blender.nodes.node_graph import NodeGraph
-from softground_addon.blender.nodes.node_modifiers import inputs_of, new_group
+from softground_addon.blender.nodes.node_modifiers import GroupInput, inputs_of, new_group
 from softground_addon.blender.nodes.shader_graph import Colour, Graph
 from softground_addon.blender.playback.own_data import COMPRESSION, REST
 
@@ -27,21 +27,22 @@ PRESSED = "softground_pressed"
 TOUCHED, BURIED = 0.0005, 0.008
 """Compression of the ground from which on pieces move with it, and at which they are pressed in for good [m]."""
 
-INPUTS: Mapping[str, tuple[str, Any, str]] = {
-    "Ground": ("NodeSocketObject", None, "The mesh that shows the prints"),
-    "Pieces": ("NodeSocketCollection", None, "Objects of size 1 that lie on the ground, one picked for each place"),
-    "Density": ("NodeSocketFloat", 1.0, "Pieces per square metre"),
-    "Where": ("NodeSocketString", "", "Float attribute of the ground that multiplies the density"),
-    "Smallest": ("NodeSocketFloat", 0.01, "Size of the smallest piece [m]"),
-    "Largest": ("NodeSocketFloat", 0.05, "Size of the largest piece [m]"),
-    "Law": ("NodeSocketFloat", 1.8, "How much more small ones there are: N larger than s goes as s to minus this"),
-    "Lean": ("NodeSocketFloat", 0.3, "Largest angle from upright of a piece that no foot has pressed [rad]"),
-    "Bend": ("NodeSocketFloat", 0.0, "Angle from upright of a piece that a foot has pressed [rad]"),
-    "Depth": ("NodeSocketFloat", 0.0, "How deep pieces lie in the ground, in sizes"),
-    "Bury": ("NodeSocketFloat", 0.3, "How much deeper a foot may press them, in sizes"),
-    "Seed": ("NodeSocketInt", 0, "Another number strews them elsewhere"),
-}
-"""What the group asks for: kind of socket, value at first, meaning."""
+INPUTS = (
+    GroupInput("Ground", None, "The mesh that shows the prints", kind="Object"),
+    GroupInput(
+        "Pieces", None, "Objects of size 1 that lie on the ground, one picked for each place", kind="Collection"
+    ),
+    GroupInput("Density", 1.0, "Pieces per square metre"),
+    GroupInput("Where", "", "Float attribute of the ground that multiplies the density", kind="String"),
+    GroupInput("Smallest", 0.01, "Size of the smallest piece [m]"),
+    GroupInput("Largest", 0.05, "Size of the largest piece [m]"),
+    GroupInput("Law", 1.8, "How much more small ones there are: N larger than s goes as s to minus this"),
+    GroupInput("Lean", 0.3, "Largest angle from upright of a piece that no foot has pressed [rad]"),
+    GroupInput("Bend", 0.0, "Angle from upright of a piece that a foot has pressed [rad]"),
+    GroupInput("Depth", 0.0, "How deep pieces lie in the ground, in sizes"),
+    GroupInput("Bury", 0.3, "How much deeper a foot may press them, in sizes"),
+    GroupInput("Seed", 0, "Another number strews them elsewhere", kind="Int"),
+)
 
 
 def ensure_group() -> Any:
@@ -49,14 +50,7 @@ def ensure_group() -> Any:
     known = next((tree for tree in bpy.data.node_groups if tree.get(MARK)), None)
     if known is not None:
         return known
-    graph = NodeGraph(new_group(GROUP, MARK))
-    interface = graph.tree.interface
-    interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    for name, (kind, value, meaning) in INPUTS.items():
-        socket = interface.new_socket(name, in_out="INPUT", socket_type=kind)
-        socket.description = meaning
-        if value is not None:
-            socket.default_value = value
+    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
     chosen = graph.node("NodeGroupInput").outputs
     seed = chosen["Seed"]
 

@@ -16,7 +16,7 @@ from typing import Any
 import bpy
 
 from ..nodes.node_graph import NodeGraph
-from ..nodes.node_modifiers import new_group
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Debris"
 MARK = "softground_debris"
@@ -38,6 +38,19 @@ SHAPED = 4000
 """How many of the largest pieces have a shape at first."""
 FULL_TURNS = 12.0
 """How fast pieces turn in the air [rad/s]."""
+
+INPUTS = (
+    GroupInput("Wind", None, "Wind in metres per second, which carries the flying pieces along", kind="Vector"),
+    GroupInput("Amount", 1.0, "Share of the pieces that are shown", (0.0, 1.0)),
+    GroupInput(
+        "Shaped",
+        SHAPED,
+        "How many of the largest pieces have a shape; all others are round, and play much faster",
+        (0, 2**31 - 1),
+        "Int",
+    ),
+    GroupInput("Shapes", None, "Objects of radius 1 for the large pieces, one picked for each", kind="Collection"),
+)
 
 
 def build(
@@ -146,26 +159,13 @@ class _Graph(NodeGraph):
     """The debris' group, while it is built."""
 
     def __init__(self) -> None:
-        super().__init__(new_group(GROUP, MARK))
+        super().__init__(new_group(GROUP, MARK, INPUTS))
 
     def inputs(self, shapes: bpy.types.Collection) -> list[Any]:
         """Geometry, wind, amount, how many are shaped, and shapes."""
-        interface = self.tree.interface
-        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        wind = interface.new_socket("Wind", in_out="INPUT", socket_type="NodeSocketVector")
-        wind.description = "Wind in metres per second, which carries the flying pieces along"
-        amount = interface.new_socket("Amount", in_out="INPUT", socket_type="NodeSocketFloat")
-        amount.default_value, amount.min_value, amount.max_value = 1.0, 0.0, 1.0
-        amount.description = "Share of the pieces that are shown"
-        shaped = interface.new_socket("Shaped", in_out="INPUT", socket_type="NodeSocketInt")
-        shaped.default_value, shaped.min_value = SHAPED, 0
-        shaped.description = "How many of the largest pieces have a shape; all others are round, and play much faster"
-        collection = interface.new_socket("Shapes", in_out="INPUT", socket_type="NodeSocketCollection")
-        collection.default_value = shapes
-        collection.description = "Objects of radius 1 for the large pieces, one picked for each"
+        self.tree.interface.items_tree["Shapes"].default_value = shapes
         group = self.node("NodeGroupInput")
-        return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
+        return [group.outputs[name] for name in ("Geometry", *(name for name, *_ in INPUTS))]
 
     def shown(self, geometry: Any, material: Any, selection: Any = True) -> Any:
         """Geometry with a material on some or all of it."""

@@ -64,7 +64,7 @@ class NodeGraph:
     def next_row(self) -> None:
         self._place = [2 * COLUMN, self._place[1] - ROW]
 
-    def node(self, kind: str, inputs: Mapping[str | int, Any] | None = None, **properties: Any) -> Any:
+    def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
         """A node with its properties set and its inputs, given by name or position, linked or set."""
         if self._known is None:
             node = self.tree.nodes.new(kind)

@@ -46,7 +46,6 @@ def selected(ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
 def _group(debris: bpy.types.Object, clouds: bool) -> Any:
     """Nodes that give the points of an object and of its instances."""
     graph = NodeGraph(new_group("SoftGround Debris Points", nodes.MARK))
-    graph.tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     source = graph.node("GeometryNodeObjectInfo", {"Object": debris}, transform_space="RELATIVE")
     parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": source.outputs["Geometry"]})
     of_pieces = {"Instances": parts.outputs["Instances"], "Radius": graph.attribute(nodes.RADIUS)}

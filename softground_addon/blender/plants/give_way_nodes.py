@@ -8,7 +8,6 @@ is there. What no sole has come near is only compared.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
@@ -17,7 +16,7 @@ import bpy
 
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number
-from ..nodes.node_modifiers import new_group
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Give Way"
 MARK = "softground_give_way"
@@ -46,18 +45,17 @@ _ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW = (
 far its root goes up; `_LEAN` the way of what is upright, for its length."""
 _MEANWHILE = (_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW)
 
-INPUTS: Mapping[str, tuple[str, Any, tuple[float, float] | None, str]] = {
-    "Table": ("NodeSocketObject", None, None, "Where and when soles tread: an object that each bake writes"),
-    "Height": ("NodeSocketFloat", 0.3, (0.001, 10.0), "Height of the tallest plants, from which on soles bend them"),
-    "Stiffness": ("NodeSocketFloat", 0.15, (0.0, 1.0), "Share of the bend that springs back as the sole leaves"),
-    "Recovery": ("NodeSocketFloat", 240.0, (0.1, 86400.0), "Seconds in which plants rise to 1/e of their bend"),
-    "Breaks": ("NodeSocketFloat", 0.3, (0.0, 10.0), "How much stays bent for good: 1 is all of it from 150 kPa on"),
-    "Half After": ("NodeSocketFloat", 150.0, (1.0, 10_000.0), "Passes after which half of the plants are worn down"),
-    "Stands": ("NodeSocketBool", True, None, "Plants that bend; off for what lies on the ground and tilts with it"),
-    "Sinks": ("NodeSocketBool", True, None, "Press roots into the prints; off where the scatter follows the ground"),
-    "Loose Parts": ("NodeSocketBool", False, None, "Bend each separate part of a mesh about its lowest vertices"),
-}
-"""What the group asks for: kind of socket, value at first, range, meaning."""
+INPUTS = (
+    GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
+    GroupInput("Height", 0.3, "Height of the tallest plants, from which on soles bend them", (0.001, 10.0)),
+    GroupInput("Stiffness", 0.15, "Share of the bend that springs back as the sole leaves", (0.0, 1.0)),
+    GroupInput("Recovery", 240.0, "Seconds in which plants rise to 1/e of their bend", (0.1, 86400.0)),
+    GroupInput("Breaks", 0.3, "How much stays bent for good: 1 is all of it from 150 kPa on", (0.0, 10.0)),
+    GroupInput("Half After", 150.0, "Passes after which half of the plants are worn down", (1.0, 10000.0)),
+    GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
+    GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
+    GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+)
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
@@ -67,20 +65,9 @@ def ensure_group() -> Any:
     known = next((group for group in bpy.data.node_groups if is_give_way(group) and not group.library), None)
     if known is not None:
         return known
-    tree: Any = new_group(GROUP, MARK)
-    graph = NodeGraph(tree)
-    interface = tree.interface
-    for way in ("INPUT", "OUTPUT"):
-        interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    for name, (kind, value, span, meaning) in INPUTS.items():
-        socket = interface.new_socket(name, in_out="INPUT", socket_type=kind)
-        socket.description = meaning
-        if value is not None:
-            socket.default_value = value
-        if span:
-            socket.min_value, socket.max_value = span
+    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
     _fill(graph)
-    return tree
+    return graph.tree
 
 
 def is_give_way(tree: Any) -> bool:

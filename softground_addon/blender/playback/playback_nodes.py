@@ -17,7 +17,7 @@ from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
 from ..nodes.node_graph import NodeGraph
-from ..nodes.node_modifiers import new_group
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"
@@ -121,6 +121,17 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     return None
 
 
+INPUTS = (
+    GroupInput(
+        "Shading",
+        True,
+        "Update compression, rim, age and pressure over time, for materials that read them",
+        kind="Bool",
+    ),
+    GroupInput("Up", (0.0, 0.0, 1.0), "World up in the ground's space, one metre long", kind="Vector"),
+)
+
+
 class _KeyframeTables:
     """Values of the keyframe_tables of vertices at a place along their splines."""
 
@@ -147,19 +158,11 @@ class _Graph(NodeGraph):
     """The playback's group, while it is built."""
 
     def __init__(self) -> None:
-        super().__init__(new_group(GROUP, MARK))
+        super().__init__(new_group(GROUP, MARK, INPUTS))
 
     def inputs(self, up: Sequence[float]) -> tuple[Any, Any]:
         """The group's geometry and the scene's frame, with its fraction."""
-        interface = self.tree.interface
-        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        shading = interface.new_socket("Shading", in_out="INPUT", socket_type="NodeSocketBool")
-        shading.default_value = True
-        shading.description = "Update compression, rim, age and pressure over time, for materials that read them"
-        direction = interface.new_socket("Up", in_out="INPUT", socket_type="NodeSocketVector")
-        direction.default_value = tuple(up)
-        direction.description = "World up in the ground's space, one metre long"
+        self.tree.interface.items_tree["Up"].default_value = tuple(up)
         group = self.node("NodeGroupInput")
         self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
         return group.outputs["Geometry"], self.frame()

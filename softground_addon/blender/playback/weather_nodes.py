@@ -22,10 +22,11 @@ from ...core.weather.weather import Matter, Span
 from ...core.weather.weather_places import BOUNDS, COVERED, NEAR, POWERS
 from ..nodes import node_graph
 from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import add_sockets
 from . import weather_table
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import ENDLESS, HOLLOWS, TABLE, CourseNodes
-from .weather_inputs import INPUTS, add_sockets, hold
+from .weather_inputs import INPUTS, hold
 
 WITHIN = "SoftGround Weather Nodes"
 """The group that has the nodes. Of a modifier's own group, Blender notes the values of all sockets at each frame."""
@@ -109,7 +110,7 @@ def build(
     inner = within(tree)
     if inner is None:
         inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
-        add_sockets(inner)
+        add_sockets(inner, INPUTS)
     existing = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
     asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
     tables = {name: existing[name] or weather_table.new() for name in asked}

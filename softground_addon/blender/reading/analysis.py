@@ -200,7 +200,8 @@ def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
         return
     work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
-    if state.analyses.get(uid) is analysis:
+    latest: Analysis | None = state.analyses.get(uid)
+    if latest is analysis:
         state.analyses[uid] = renewed = replace(analysis, contacts=contacts)
         state.depths.clear()
         state.depths[_key(wanted, renewed)] = contacts.typical
