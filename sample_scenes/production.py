@@ -58,7 +58,7 @@ class Claim:
 
     @property
     def holds(self) -> bool:
-        """Whether the number is in its range."""
+        """True if the number is in its range."""
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:

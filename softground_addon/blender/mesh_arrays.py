@@ -167,7 +167,7 @@ def triangle_corners(faces: Faces) -> Slices[Indices]:
 
 
 def _has_outer_diagonal(*corners: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return whether the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
+    """True if the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
     first, diagonal, last = (corner - corners[0] for corner in corners[1:])
 
     def dot(a: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -47,7 +47,7 @@ def calls(tree):
 
 
 def writes(tree):
-    """Whether files are written to otherwise than under the name that `replacing` gives."""
+    """True if files are written to otherwise than under the name that `replacing` gives."""
     given = {
         item.optional_vars.id
         for node in ast.walk(tree)

@@ -1,4 +1,4 @@
-"""Whether two versions press the same ground: the records in .blend files of the same names, side by side.
+"""True if two versions press the same ground: the records in .blend files of the same names, side by side.
 
     python -m tests.validation.compare_bakes FOLDER_BEFORE FOLDER_AFTER
 

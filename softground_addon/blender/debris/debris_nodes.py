@@ -25,7 +25,7 @@ MARK = "softground_debris"
 BIRTH, FLIGHT, DRAG = "softground_birth", "softground_flight", "softground_drag"
 """Of a point: frame of its birth, time in the air [s], settling speed over gravity [s]."""
 SMALL = "softground_small"
-"""Whether it is one of the seen round points."""
+"""True if it is one of the seen round points."""
 START, LAUNCH = "softground_start", "softground_launch"
 """Its first place [Blender units] and its first speed [Blender units/s]."""
 RANK = "softground_rank"
@@ -173,12 +173,12 @@ class _Graph(NodeGraph):
         return self.node("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
 
     def has_look(self, number: int) -> Any:
-        """Return whether a point has a look of several."""
+        """True if a point has a look of several."""
         look = self.math("SUBTRACT", self.attribute(LOOK, "INT"), float(number))
         return self.less(self.math("ABSOLUTE", look), 0.5)
 
     def less(self, first: Any, second: Any) -> Any:
-        """Return whether one is less than the other."""
+        """True if one is less than the other."""
         return self.compare("LESS_THAN", first, second)
 
     def joined(self, *geometries: Any) -> Any:

@@ -43,7 +43,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def is_edited(self) -> bool:
-        """Return whether there is anything to be reset."""
+        """True if there is anything to be reset."""
         return self.is_copy or self.edit != UNCHANGED
 
     @property
@@ -90,7 +90,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def has_foot(self) -> bool:
-        """Return whether a foot made it, and neither a ball nor a wheel."""
+        """True if a foot made it, and neither a ball nor a wheel."""
         made_by = self.baked.pressed_by
         return made_by is not None and made_by.pressing.sole.prop is None
 

@@ -41,7 +41,7 @@ class NodeGraph:
     Parameters
     ----------
     known : bool
-        Whether it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
+        True if it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
     """
 
     def __init__(self, tree: Any, *, known: bool = False) -> None:
@@ -255,7 +255,7 @@ class NodeGraph:
 
 
 def _is(value: Any, other: Any) -> bool:
-    """Return whether a socket's value is another one, as Blender rounds numbers."""
+    """True if a socket's value is another one, as Blender rounds numbers."""
     if isinstance(other, bool | int | float) or (isinstance(other, tuple | list) and value is not None):
         return np.array_equal(np.asarray(value, np.float32), np.asarray(other, np.float32))
     return bool(value == other)

@@ -41,7 +41,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh is selected that may be covered."""
+        """True if a mesh is selected that may be covered."""
         cls.poll_message_set(translated("Select the mesh to cover, in Object Mode"))
         return context.mode == "OBJECT" and selected_ground(context) is not None
 

@@ -61,7 +61,7 @@ class DepthPrediction:
     depth : float or None
         Of the typical print to expect [m], as it was known last.
     is_current : bool
-        Whether nothing has changed since.
+        True if nothing has changed since.
     """
 
     analysis: Analysis

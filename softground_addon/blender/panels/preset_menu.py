@@ -167,7 +167,7 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the chosen preset is one of the user's."""
+        """True if the chosen preset is one of the user's."""
         cls.poll_message_set(translated("Built-in presets cannot be deleted; choose one of your own"))
         return _chosen_of_user(context) is not None
 

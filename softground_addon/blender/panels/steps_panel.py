@@ -26,7 +26,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a bake that is not about to change."""
+        """True if there is a bake that is not about to change."""
         ground = settings.options_of(context).ground
         return ground is not None and not live.is_on() and baked_ground.is_baked(ground)
 

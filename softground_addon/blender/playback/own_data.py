@@ -35,7 +35,7 @@ def made(mesh: bpy.types.Mesh) -> set[str]:
 
 
 def has_made(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Return whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
+    """True if a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
     return name in _noted(mesh) and name in mesh.attributes
 
 

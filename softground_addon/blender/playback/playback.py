@@ -163,7 +163,7 @@ def _remove_table(table: bpy.types.Object) -> None:
 
 
 def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
-    """Return whether the playback moves each vertex, (V,); None where there is none."""
+    """True if the playback moves each vertex, (V,); None where there is none."""
     attribute: Any = mesh.attributes.get(nodes.MOVED)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "BOOLEAN"):
         return None

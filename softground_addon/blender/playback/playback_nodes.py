@@ -25,7 +25,7 @@ MARK = "softground_playback"
 
 REST = "softground_rest"
 MOVED = "softground_moved"
-"""Whether the bake moves or touches the vertex at all."""
+"""True if the bake moves or touches the vertex at all."""
 START, END = "softground_start", "softground_end"
 """Frame from which on something happens to a vertex, and frame from which on nothing does."""
 SPLINE, OFFSET = "softground_spline", "softground_offset"
@@ -58,9 +58,9 @@ def build(
     frame_rate : float
         Frames of the table per second [Hz].
     few : bool
-        Whether so few of the vertices move that looking all of them up costs less than telling them apart.
+        True if so few of the vertices move that looking all of them up costs less than telling them apart.
     settled : bool
-        Whether the positions that the group is given are those at which vertices come to rest, whatever the user does.
+        True if the positions that the group is given are those at which vertices come to rest, whatever the user does.
     """
     graph = _Graph()
     geometry, frame = graph.inputs(up)
@@ -108,7 +108,7 @@ def build(
 
 
 def is_playback(tree: bpy.types.NodeTree) -> bool:
-    """Return whether a node group is one that `build` made; before it was marked, only its name told."""
+    """True if a node group is one that `build` made; before it was marked, only its name told."""
     return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
 
 

@@ -66,7 +66,7 @@ def new() -> Any:
 
 
 def is_weather(tree: bpy.types.NodeTree) -> bool:
-    """Return whether a node group is one that `new` made."""
+    """True if a node group is one that `new` made."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 

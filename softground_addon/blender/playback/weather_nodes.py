@@ -101,11 +101,11 @@ def build(
     soaking : (float, float)
         Of the hollows; see `core.weather.weather_places.soaking_shares`.
     felt : bool
-        Whether steps felt the weather: how deep they are below new snow is then not what the record has.
+        True if steps felt the weather: how deep they are below new snow is then not what the record has.
     again : bool
-        Whether there are steps into earlier prints.
+        True if there are steps into earlier prints.
     has_water : bool
-        Whether the bake itself has water in prints.
+        True if the bake itself has water in prints.
     """
     inner = within(tree)
     if inner is None:

@@ -93,7 +93,7 @@ def look_again() -> None:
 
 
 def is_empty() -> bool:
-    """Return whether no shot is known."""
+    """True if no shot is known."""
     return not state.analyses
 
 

@@ -170,7 +170,7 @@ def _evaluate(
 
 
 def is_simulated(obj: bpy.types.Object) -> bool:
-    """Return whether Blender's rigid bodies move an object, or one that it is parented to."""
+    """True if Blender's rigid bodies move an object, or one that it is parented to."""
     node: bpy.types.Object | None = obj
     while node is not None:
         if node.rigid_body and node.rigid_body.type == "ACTIVE":

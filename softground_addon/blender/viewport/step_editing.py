@@ -44,7 +44,7 @@ class OnSteps(OnBake):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a bake, and neither another one nor live mode is at work."""
+        """True if there is a bake, and neither another one nor live mode is at work."""
         if session.current().is_baking or live.is_on():
             cls.poll_message_set(
                 translated("A bake is running, or live mode is on: wait, or press Keep or Discard first")

@@ -206,7 +206,7 @@ class EditedSteps:
         return [n for n in np.flatnonzero(near).tolist() if self._reads(n, None, cells)]
 
     def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
-        """Return whether a step, as it was baked or as it is now, presses some cells."""
+        """True if a step, as it was baked or as it is now, presses some cells."""
         prints = (self._before(number), footprint)
         return any(
             bool(among(cells, pressed).any())
@@ -350,7 +350,7 @@ def _within(changes: frozenset[Change], edits: Mapping[int, StepEdit]) -> bool:
 
 
 def _at_once(footprint: Footprint | None, other: Footprint | None) -> bool:
-    """Return whether two prints were made at the same time."""
+    """True if two prints were made at the same time."""
     if footprint is None or other is None:
         return False
     return abs(footprint.start_frame - other.start_frame) + abs(footprint.end_frame - other.end_frame) < _SAME_TIME

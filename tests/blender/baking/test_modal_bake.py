@@ -228,7 +228,7 @@ def test_a_bake_whose_draft_is_purged_says_so(scene):
 
 
 def works_after(bake, seconds):
-    """Whether a tick works that comes some time after the last one [s]."""
+    """True if a tick works that comes some time after the last one [s]."""
     before = bake.worked
     bake._ticked = time.perf_counter() - seconds
     modal_job.ModalJob._tick(bake)
@@ -295,7 +295,7 @@ def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
 
 
 def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):
-    """Whether a bake lets an event through to a sidebar that shows a tab."""
+    """True if a bake lets an event through to a sidebar that shows a tab."""
     region = SimpleNamespace(type="UI", x=0, y=0, width=100, height=100, active_panel_category=tab)
     screen = SimpleNamespace(areas=[SimpleNamespace(type="VIEW_3D", regions=[region])])
     event = SimpleNamespace(type=kind, mouse_x=place[0], mouse_y=place[1], ctrl=ctrl)

@@ -48,7 +48,7 @@ class Animal:
     names : str
         Which bones tell what they are.
     tail, rolls, on_the_spot, carried : bool
-        Whether it has a tail, its heels rise before its toes, it stays where it is, its object travels.
+        True if it has a tail, its heels rise before its toes, it stays where it is, its object travels.
     turn : float
         Its heading [rad].
     level : float
@@ -56,12 +56,12 @@ class Animal:
     offset : float
         Phase between the pairs of legs.
     idle : bool
-        Whether it stands where it is and moves its trunk alone.
+        True if it stands where it is and moves its trunk alone.
     skates, trembles, floats : float
         Share of its stride by which a standing foot slides, how far its feet tremble, and by how much the first of them
         stands higher than the others.
     toes, arms, grazes, fine : bool
-        Whether its feet have toes, it has arms or holds its head low, and its skin has more vertices than corners.
+        True if its feet have toes, it has arms or holds its head low, and its skin has more vertices than corners.
     seed : int
     """
 

@@ -84,7 +84,7 @@ def scatter_by_particles(ground):
 
 
 def shown(thing):
-    """Whether an object's own mesh is in the viewport, and how many instances are on it."""
+    """True if an object's own mesh is in the viewport, and how many instances are on it."""
     mesh, instances = False, 0
     for instance in bpy.context.evaluated_depsgraph_get().object_instances:
         if instance.is_instance:

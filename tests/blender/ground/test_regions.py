@@ -69,7 +69,7 @@ def bytes_of(footprints):
 
 
 def inside(step, stripe):
-    """Return whether a sole stayed in one stripe, three cells from its borders."""
+    """True if a sole stayed in one stripe, three cells from its borders."""
     y = step.window.centres(step.cell_size)[1][np.asarray(step.contact_cells) // step.window.columns]
     ends = (5.0, *BORDERS, -5.0)
     return ends[stripe + 1] + 0.06 < y.min() and y.max() < ends[stripe] - 0.06

@@ -328,7 +328,7 @@ def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
 
 
 def reset_button(scene):
-    """Whether the panel's button that resets the selected steps is enabled, and its icon."""
+    """True if the panel's button that resets the selected steps is enabled, and its icon."""
     rows, layout = [], MagicMock()
     layout.row.side_effect = lambda **_: rows.append(MagicMock()) or rows[-1]
     steps_panel.SOFTGROUND_PT_steps.draw(MagicMock(fields=lambda: layout), SimpleNamespace(scene=scene))

@@ -61,7 +61,7 @@ def alone(ground, kind):
 
 
 def same(first, other):
-    """Return whether two prints change the ground by the same bits."""
+    """True if two prints change the ground by the same bits."""
     return all(
         np.array_equal(np.asarray(getattr(a, name)), np.asarray(getattr(b, name)))
         for a, b in ((first.compression, other.compression), (first.rim, other.rim))
