@@ -108,8 +108,8 @@ def build(
 
 
 def is_playback(tree: bpy.types.NodeTree) -> bool:
-    """True if a node group is one that `build` made; before it was marked, only its name told."""
-    return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
+    """True if a node group is one that `build` made."""
+    return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
