@@ -155,13 +155,15 @@ def faults(language: str) -> dict[str, list[str]]:
     return {
         "missing": sorted(wanted - texts.keys()),
         "superfluous": sorted(texts.keys() - wanted),
-        "other names": sorted(text for text, own in texts.items() if names(text) != names(own)),
+        "other names": sorted(text for text, translated in texts.items() if names(text) != names(translated)),
     }
 
 
 if __name__ == "__main__":
     softground_addon.register()
-    found = [(language, what, text) for language in LANGUAGES for what, of in faults(language).items() for text in of]
-    sys.stdout.writelines(f"{language}: {what}: {text}\n" for language, what, text in found)
+    all_faults = [
+        (language, what, text) for language in LANGUAGES for what, of in faults(language).items() for text in of
+    ]
+    sys.stdout.writelines(f"{language}: {what}: {text}\n" for language, what, text in all_faults)
     softground_addon.unregister()
-    sys.exit(bool(found))
+    sys.exit(bool(all_faults))

@@ -9,11 +9,11 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ...core.composers.edited_contacts import swapped
 from ...core.errors import InputError
 from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.arrays import Array
 from ...core.numerics.rigid import rotation
+from ...core.pressing.edited_contacts import swapped
 from ...core.record import record
 from ...core.record.contact_steps import PressingSole, Steps
 from ...core.record.edits import UNCHANGED, StepEdit, feet, sole_of

@@ -21,6 +21,7 @@ from ..imprints.sole_points import SolePoints, sole_points
 from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
+from ..pressing.edited_contacts import edited_contact
 from ..pressing.ground_cells import GroundCells, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
@@ -30,7 +31,6 @@ from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from ..record.footprints import Footprint
 from ..record.mesh_sole import MeshSole
 from ..record.record import BakeRecord
-from .edited_contacts import edited_contact
 from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
 
 Change = tuple[int, StepEdit]
