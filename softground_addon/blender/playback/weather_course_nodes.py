@@ -58,8 +58,8 @@ SUMS = {
     "loss": ("filled", "thawed", "pale"),
     "hollows": ("low", "high", "seeped"),
 }
-"""Sums over time in each row, in vectors of these names: as `core.weather.weather_course.Course` has it, but *filled* is
-less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
+"""Sums over time in each row, in vectors of these names: as `core.weather.weather_course.Course` has it, but *filled*
+is less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
 
 
 def field_of(name: str) -> str:
