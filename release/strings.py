@@ -88,7 +88,7 @@ def _in_tables() -> Iterator[str]:
     yield from (surface.label.lower() for surface in SURFACES.values())
     yield from (joint.partition("_")[0].capitalize() for joint in JOINTS)
     yield from (*UNITS, "metres", "another unit")
-    yield from (text for name, *_, tooltip in (*weather_inputs.INPUTS, *marks_nodes.INPUTS) for text in (name, tooltip))
+    yield from (text for each in (*weather_inputs.INPUTS, *marks_nodes.INPUTS) for text in (each.name, each.meaning))
 
 
 def _in_code() -> Iterator[str]:
