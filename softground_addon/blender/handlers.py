@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import reuse, session, translation, tread_images
+from . import reuse, session, settings, translation, tread_images
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -66,21 +66,15 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         _later(compare_prediction)
 
 
-def _grounds(scene: Any) -> list[bpy.types.Object]:
-    """The grounds of the settings, deleted or not."""
-    options = scene.softground
-    return [obj for obj in (options.ground, *(item.object for item in options.grounds)) if obj is not None]
-
-
 def _follow_deletion(scene: Any) -> None:
-    for ground in _grounds(scene) if not live.is_on() else ():
+    for ground in settings.listed_grounds(scene.softground) if not live.is_on() else ():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
             belongs.follow(ground, is_deleted=is_deleted)
 
 
 def _follow_weather_keys(scene: Any) -> None:
-    for ground in _grounds(scene):
+    for ground in settings.listed_grounds(scene.softground):
         weather_keys.follow(baked_ground.display_mesh_of(ground))
 
 

@@ -62,10 +62,14 @@ def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
     return [obj for obj in listed if exists(obj) and obj not in soft]
 
 
+def listed_grounds(options: Any) -> list[bpy.types.Object]:
+    """The soft grounds of the settings, each once, deleted or not."""
+    return [*filter(None, dict.fromkeys([options.ground, *(item.object for item in options.grounds)]))]
+
+
 def grounds_of(options: Any) -> list[bpy.types.Object]:
     """The soft grounds of the settings that are there, each once; none without the first."""
-    listed = dict.fromkeys([options.ground, *(item.object for item in options.grounds)])
-    return [obj for obj in listed if exists(obj)] if exists(options.ground) else []
+    return list(filter(exists, listed_grounds(options))) if exists(options.ground) else []
 
 
 def _further_grounds(options: Any, units: SceneUnits) -> tuple[GroundSettings, ...]:

@@ -254,7 +254,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = settings.scene_of(context)
-        grounds = filter(None, dict.fromkeys([scene.softground.ground, *settings.grounds_of(scene.softground)]))
+        grounds = settings.listed_grounds(scene.softground)
         if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
@@ -266,15 +266,14 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        shown = scene.softground.ground
-        others = [] if self.only_shown else settings.grounds_of(scene.softground)
+        grounds = settings.listed_grounds(scene.softground)
         reuse.forget()
         with analysis.own_changes(scene):
-            for ground in filter(None, dict.fromkeys([shown, *others])):
+            for ground in grounds[:1] if self.only_shown else grounds:
                 if baked_ground.has_remains(ground):
                     baked_ground.clear(ground)
                 look.take_off(ground)
-            if self.only_shown and settings.grounds_of(scene.softground)[1:]:
+            if self.only_shown and grounds[1:]:
                 return {"FINISHED"}
             response_job.remove_layers(scene, LayerKind.RESPONSE)
         response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
