@@ -9,6 +9,7 @@ import pytest
 from softground_addon.blender import further_grounds, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
+from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
@@ -383,7 +384,7 @@ def test_a_ground_that_no_step_is_on_any_more_is_cleared(crate):
     assert not baked_ground.has_remains(crate)
 
 
-def test_weather_and_marks_are_of_each_ground(crate):
+def test_weather_is_of_each_ground(crate):
     scene = bpy.context.scene
     item = also(crate)
     bake(scene)
@@ -397,3 +398,21 @@ def test_weather_and_marks_are_of_each_ground(crate):
     assert (now.weather.surface, now.grounds[0].weather.surface) == ("snow", "snow")
     assert bake(scene).report["warnings"] == []
     assert weather_modifier.modifier_of(baked_ground.display_mesh_of(crate)) is not None
+
+
+def test_marks_and_hard_steps_beside_several_grounds_are_there_once(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    bpy.ops.softground.load_preset(name="Mud")
+    scene.softground.cell_size, scene.softground.debris, scene.softground.marks = 0.02, False, True
+    scene.softground.hard_grounds.add().object = box(scene, "Slab", 0.004, y=(-4.6, -2.6), x=(-1.0, 1.0), bottom=-0.1)
+    bpy.context.view_layer.update()
+    report = bake(scene).report
+    assert {row["ground"] for row in report["steps"]} == {"Field", CRATE}
+    assert all(row["position"][1] > -2.75 for row in report["steps"])
+    hard = [row for row in report["events"] if row["surface"] == "hard"]
+    assert hard
+    assert len({(row["frame"], row["contact"], row["phase"]) for row in hard}) == len(hard)
+    assert all(row["surface"] != "hard" for row in baked_ground.events_of(item.object))
+    assert len(marks_object.of(floor).data.polygons) + len(marks_object.of(crate).data.polygons) > 0
+    assert report["totals"]["carried_kg"]["picked_up"] > 0
