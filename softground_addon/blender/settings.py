@@ -212,6 +212,11 @@ def is_prop(character: Any) -> bool:
     return not (character.armature or character.body) and any(sole.object for sole in character.soles)
 
 
+def body_of(character: Any) -> bpy.types.Object | None:
+    """The object that stands for a character: its armature, its body, or the prop itself."""
+    return character.armature or character.body or next((sole.object for sole in character.soles if sole.object), None)
+
+
 def is_set_up(character: Any) -> bool:
     """Return whether an entry of the characters still has what leaves prints: an armature, a body or an object."""
     owner = character.armature or character.body

@@ -25,7 +25,7 @@ from .weather.felt_weather import FeltWeather
 
 DOWN = (0.0, 0.0, -1.0)
 
-TIME_LIMIT = "Time Limit in Advanced > Mesh and Look, or --set longest_bake=N"
+TIME_LIMIT = "Time Limit in Properties > Physics > Mesh and Look, or --set longest_bake=N"
 """By what the user sets `BakeSettings.longest_bake_s`."""
 
 

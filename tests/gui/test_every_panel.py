@@ -1,4 +1,4 @@
-"""The panels below Advanced, drawn by a real Blender."""
+"""All panels, drawn by a real Blender; those of objects where Blender has them."""
 
 import pytest
 

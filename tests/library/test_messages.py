@@ -56,5 +56,5 @@ def test_messages_of_the_library_name_no_part_of_the_panel():
 def test_messages_of_the_blender_side_do_so_that_the_test_can_fail():
     known = set(labels())
     assert names("There is no character to bake: add one with 'Add Character'.", known)
-    assert names("60 minutes are allowed (Time Limit in Advanced > Mesh and Look)", known)
+    assert names("60 minutes are allowed (Time Limit in Properties > Physics > Mesh and Look)", known)
     assert names("or apply it (Object > Apply > Scale), also on its parents.", set())

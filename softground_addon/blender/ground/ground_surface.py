@@ -80,7 +80,7 @@ def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[Me
             raise
     raise InputError(
         f"{name} is nothing but hard floor under the character's path: choose a preset for a material there, in "
-        "Advanced > Ground by Material."
+        "Properties > Physics > Ground by Material."
     )
 
 

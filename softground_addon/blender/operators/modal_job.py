@@ -351,7 +351,7 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     for area in context.screen.areas if context.screen else ():
         for region in area.regions:
             if (
-                area.type in session.PANEL_AREAS
+                area.type == "VIEW_3D"
                 and region.type == "UI"
                 and region.active_panel_category == CATEGORY
                 and 0 <= event.mouse_x - region.x < region.width

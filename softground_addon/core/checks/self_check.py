@@ -106,7 +106,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "no_print",
             "error",
             f"'{motion.name}' leaves no print in these frames",
-            "check in Advanced > Contacts that its soles are what touches the ground, and in the viewport "
+            "check in Properties > Physics > Contacts that its soles are what touches the ground, and in the viewport "
             "that they face down.",
         )
     else:

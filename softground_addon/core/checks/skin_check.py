@@ -175,7 +175,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
                 "on",
-                "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
+                "check in Properties > Physics > Contacts that its contacts are the parts that touch the ground.",
             )
         )
     rests = touching.rests
@@ -187,7 +187,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact in Advanced > Contacts.",
+                "add what rests there with Add Contact in Properties > Physics > Contacts.",
             )
         )
     return findings

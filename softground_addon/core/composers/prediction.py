@@ -52,7 +52,7 @@ LEAST_LOAD = 1e-12
 SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
 TAKES_NO_PRINT = (
     "No stiffness gives a print: the ground takes none under the feet. Check the masks, and the crust "
-    "in Advanced > Layers."
+    "in Properties > Physics > Layers."
 )
 
 
@@ -261,8 +261,8 @@ def matching_modulus(
     if not any(reached for _, reached in tried):
         raise InputError(TAKES_NO_PRINT)
     raise InputError(
-        f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm: lower Settling Time in Advanced > "
-        "Realism, or choose a smaller depth."
+        f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm: lower Settling Time in "
+        "Properties > Physics > Realism, or choose a smaller depth."
     )
 
 

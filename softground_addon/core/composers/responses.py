@@ -216,7 +216,7 @@ def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             "no_legs",
             "warning",
             f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
-            "Complete its joints in Advanced > Body Bones.",
+            "Complete its joints in Properties > Physics > Body Bones.",
         )
         for character in responses
         if not character.response.legs

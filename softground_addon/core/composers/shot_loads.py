@@ -64,7 +64,7 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: s
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         raise InputError(
             f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
-            "feet in Advanced > Contacts."
+            "feet in Properties > Physics > Contacts."
         )
     if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
         raise InputError(
