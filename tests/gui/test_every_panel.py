@@ -11,7 +11,14 @@ def facts(tell):
 
 
 def test_each_panel_is_drawn(facts):
-    assert len(facts["panels"]) == 13
+    assert len(facts["panels"]) == 14
+
+
+def test_a_button_opens_the_physics_of_character_and_ground(facts):
+    (_, of_feet, walker), (_, of_prints, ground) = facts["opened"]
+    assert (of_feet, of_prints) == ("PHYSICS", "PHYSICS")
+    assert walker == "Walker"
+    assert ground != walker
 
 
 def test_nothing_goes_wrong_on_the_console(facts):

@@ -27,10 +27,6 @@ class SOFTGROUND_MT_weather(bpy.types.Menu):
 _UNITS = {"Snowfall": "cm/h", "Temperature": "°C", "Wind": "m/s", "Rain": "mm/h", "Drying": "mm/h", "Water Table": "cm"}
 
 
-_BY_RESULT = ("Snowfall", "Time Scale")
-"""Inputs that are set by what comes of them; keys of them are in the modifier."""
-
-
 class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
     """Snow, rain, wind and thaw over the baked prints"""
 
@@ -63,8 +59,8 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         column.prop(options, "weather_hours", slider=True)
         column = layout.column(align=True)
         for name, identifier in weather_modifier.inputs_of(modifier).items():
-            if name in _BY_RESULT and not weather_keys.is_keyed(modifier, name):
-                continue
+            if name == "Time Scale" and not weather_keys.is_keyed(modifier, name):
+                continue  # Shot Lasts sets it
             holder, path = compat.input_field(modifier, identifier)
             text = f"{translated(name)} ({_UNITS[name]})" if name in _UNITS else translated(name)
             column.prop(holder, path, text=text, slider=name == "Halo", translate=False)
