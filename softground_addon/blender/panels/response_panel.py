@@ -185,6 +185,7 @@ class SOFTGROUND_PT_feet(SidebarPanel, bpy.types.Panel):
         for part in settings.PERFORMANCE:
             column.prop(options.grounding, part)
         _layers(layout, character)
+        layout.operator("softground.add_contact", icon="PLUS")
         layout.operator("softground.open_settings", text="More of the Character", icon="PHYSICS").of = "CHARACTER"
 
 

@@ -2,8 +2,10 @@
 
 import itertools
 import json
+import re
 import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -32,6 +34,8 @@ from softground_addon.core.loads.cell_limits import Coverage, Fineness
 from softground_addon.core.motion.motion import JOINTS
 from tests.blender.shots import import_motion, walker
 from tests.tiers import slow_but_one
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -228,6 +232,19 @@ def test_all_else_is_closed(addon):
     open_ones = [cls for cls in every if "DEFAULT_CLOSED" not in getattr(cls, "bl_options", ())]
     assert {cls.bl_label for cls in open_ones} == {"Character", "Ground", "Bake", "SoftGround"}
     assert [cls.bl_region_type for cls in open_ones if cls.bl_label == "SoftGround"] == ["HEADER"]  # of the overlays
+
+
+def test_where_docs_and_messages_say_that_a_setting_is_there_is_a_panel(addon):
+    every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+    below = {"Physics": [cls.bl_label for cls in every if cls.bl_region_type == "WINDOW"]}
+    for label in ("Character", "Ground"):
+        below[label] = [cls.bl_label for cls in every if getattr(cls, "bl_parent_id", "").endswith(f"_{label.lower()}")]
+    place = re.compile(rf"\b({'|'.join(below)}) > ([A-Z][\w-]+(?: [\w-]+)*)")
+    named = []
+    for path in (*(ROOT / "docs").glob("**/*.md"), *(ROOT / "softground_addon").glob("**/*.py")):
+        named += place.findall(re.sub(r'"\s+f?"', "", path.read_text(encoding="utf-8")))
+    assert len(named) > 50
+    assert [where for where in named if not where[1].startswith(tuple(below[where[0]]))] == []
 
 
 def test_the_material_is_shown_in_field_units(shot):
