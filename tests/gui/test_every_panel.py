@@ -11,7 +11,7 @@ def facts(tell):
 
 
 def test_each_panel_is_drawn(facts):
-    assert len(facts["panels"]) == 14
+    assert len(facts["panels"]) == 13
 
 
 def test_a_button_opens_the_physics_of_character_and_ground(facts):

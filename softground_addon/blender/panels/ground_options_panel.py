@@ -163,7 +163,7 @@ class SOFTGROUND_PT_hard_ground(SidebarPanel, bpy.types.Panel):
     """Crates, stairs, floors and rocks that feet stand on without a print"""
 
     bl_label = "Hard Ground"
-    bl_parent_id = "SOFTGROUND_PT_ground"
+    bl_parent_id = "SOFTGROUND_PT_feet"
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -6,8 +6,6 @@ from typing import Any
 
 import bpy
 
-from ..operators.panel_base import SidebarPanel
-
 
 class SOFTGROUND_MT_object(bpy.types.Menu):
     """Footprints of animated characters"""
@@ -63,19 +61,6 @@ class SOFTGROUND_MT_output(bpy.types.Menu):
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 
-class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
-    """Use the bake elsewhere"""
-
-    bl_label = "Output"
-    bl_order = 4
-    bl_options: Any = {"DEFAULT_CLOSED"}
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        row = self.fields().row(align=True)
-        row.operator("softground.export", icon="EXPORT")
-        row.menu("SOFTGROUND_MT_output", text="More")
-
-
 def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
     """Append the add-on's menu to the Object menu."""
     menu.layout.separator()
@@ -118,4 +103,4 @@ def unregister() -> None:
         getattr(bpy.types, name).remove(draw)
 
 
-CLASSES = (SOFTGROUND_MT_object, SOFTGROUND_MT_output, SOFTGROUND_PT_output)
+CLASSES = (SOFTGROUND_MT_object, SOFTGROUND_MT_output)

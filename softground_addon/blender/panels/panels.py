@@ -248,7 +248,6 @@ def draw_preset(layout: Any, scene: Any) -> None:
     title, picture = preset_menu.title_of_ground(options) or "Presets", preset_menu.picture_of_ground(options)
     row.menu("SOFTGROUND_MT_presets", text=title, icon_value=picture, translate=False)
     row.operator("softground.save_preset", text="", icon="ADD")
-    row.operator("softground.remove_preset", text="", icon="REMOVE")
     surface = SURFACES.get(options.material.surface)  # none where what is stored is broken
     felt = surface and surface.control
     layout.prop(*((options, felt) if felt else (options.material, "stiffness_mpa")))  # nothing moves between grounds
@@ -277,7 +276,10 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
     """Press the prints"""
 
     bl_label = "Bake"
-    bl_order = 2
+    bl_order = 3
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        self.layout.menu("SOFTGROUND_MT_output")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()

@@ -161,32 +161,33 @@ class SOFTGROUND_PT_feet(SidebarPanel, bpy.types.Panel):
     """Feet that neither slide nor float, how they wade, and the layers that move them"""
 
     bl_label = "Feet"
-    bl_parent_id = "SOFTGROUND_PT_character"
+    bl_order = 2
     bl_options: Any = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character with an armature is chosen."""
-        character = active_character(settings.options_of(context))
-        return bool(character and character.armature)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         options = settings.options_of(context)
         character = active_character(options)
-        row = layout.row(align=True)
-        row.operator("softground.clean_feet", icon="CON_FLOOR")
-        row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
-        if root_motion.speed_of(character.armature):
-            speed = translated("Travels at {speed} m/s", speed=f"{root_motion.speed_of(character.armature):.2f}")
-            layout.label(text=speed, translate=False)
+        if character and character.armature:
+            _of_rig(layout, options, character)
         column = layout.column(align=True)
-        column.active = options.grounding.use or settings.sinks_feet(options)
-        for part in settings.PERFORMANCE:
-            column.prop(options.grounding, part)
-        _layers(layout, character)
-        layout.operator("softground.add_contact", icon="PLUS")
-        layout.operator("softground.open_settings", text="More of the Character", icon="PHYSICS").of = "CHARACTER"
+        column.operator("softground.add_contact", icon="PLUS")
+        column.operator("softground.open_settings", text="More of the Character", icon="PHYSICS").of = "CHARACTER"
+
+
+def _of_rig(layout: Any, options: Any, character: Any) -> None:
+    """What corrects the feet of a rig, how it wades, and its layers."""
+    row = layout.row(align=True)
+    row.operator("softground.clean_feet", icon="CON_FLOOR")
+    row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
+    if root_motion.speed_of(character.armature):
+        speed = translated("Travels at {speed} m/s", speed=f"{root_motion.speed_of(character.armature):.2f}")
+        layout.label(text=speed, translate=False)
+    column = layout.column(align=True)
+    column.active = options.grounding.use or settings.sinks_feet(options)
+    for part in settings.PERFORMANCE:
+        column.prop(options.grounding, part)
+    _layers(layout, character)
 
 
 class SOFTGROUND_PT_response(CharacterPanel, bpy.types.Panel):

@@ -31,7 +31,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
     """Snow, rain, wind and thaw over the baked prints"""
 
     bl_label = "Weather"
-    bl_order = 3
+    bl_order = 4
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod

@@ -187,7 +187,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact in Character > Feet.",
+                "add what rests there with Add Contact in Feet.",
             )
         )
     return findings

@@ -99,7 +99,7 @@ def test_panels_come_in_the_order_of_work(addon):
     order = [cls.bl_label for cls in sorted(shown, key=lambda cls: getattr(cls, "bl_order", 0))]
     of_objects = ["SoftGround Character", "SoftGround Ground"]
     assert [label for label in order if label not in of_objects] == [
-        *("Character", "Ground", "Look of Prints", "Bake", "Weather", "Steps", "Output")
+        *("Character", "Ground", "Look of Prints", "Feet", "Bake", "Weather", "Steps")
     ]
 
 
@@ -108,7 +108,9 @@ def drawn(panel):
     layout = MagicMock()
     for part in ("row", "column", "box", "split"):
         getattr(layout, part).return_value = layout
-    panel.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
+    for part in ("draw", "draw_header_preset"):
+        if hasattr(panel, part):
+            getattr(panel, part)(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
     return layout.method_calls, layout
 
 
@@ -237,8 +239,7 @@ def test_all_else_is_closed(addon):
 def test_where_docs_and_messages_say_that_a_setting_is_there_is_a_panel(addon):
     every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
     below = {"Physics": [cls.bl_label for cls in every if cls.bl_region_type == "WINDOW"]}
-    for label in ("Character", "Ground"):
-        below[label] = [cls.bl_label for cls in every if getattr(cls, "bl_parent_id", "").endswith(f"_{label.lower()}")]
+    below |= {"Feet": ["Hard Ground"], "Bake": ["Output"]}
     place = re.compile(rf"\b({'|'.join(below)}) > ([A-Z][\w-]+(?: [\w-]+)*)")
     named = []
     for path in (*(ROOT / "docs").glob("**/*.md"), *(ROOT / "softground_addon").glob("**/*.py")):

@@ -11,7 +11,7 @@ from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
 OF_CHARACTER = ("soles", "joints", "response", "foot_locks")
 OF_GROUND = ("material", "layers", "painted", "mesh")
-IN_SIDEBAR = ("prints", "hard_ground", "feet", "weather", "steps", "output")
+IN_SIDEBAR = ("prints", "hard_ground", "feet", "weather", "steps")
 
 
 def tell(hand: Hand, facts: dict) -> Steps:

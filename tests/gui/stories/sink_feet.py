@@ -85,4 +85,4 @@ def show_open(panel: type) -> None:
     bpy.utils.register_class(type("TEST_PT_open", panel.__bases__, shown | kept))
 
 
-_PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "bl_parent_id")
+_PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category")
