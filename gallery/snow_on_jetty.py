@@ -49,7 +49,12 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     bpy.ops.softground.cover(thickness_cm=THICKNESS_CM)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (1.75, 1.75, 0.82), (-0.12, -1.6, 0.06), 30.0, (0.0, -0.4, 0.0), 9.0)
-    chosen = {"relief_vertices": "300000", "material.layer_depth": str(-top), "under": "NEVER"} | dict(options or {})
+    chosen = {
+        "relief_vertices": "300000",
+        "material.layer_depth": str(-top),
+        "under": "NEVER",
+        "material.youngs_modulus": "1.2e5",
+    } | dict(options or {})
     ground = scene.softground.ground
     return SnowOnJetty({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 

@@ -279,7 +279,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
     bl_order = 3
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        self.layout.menu("SOFTGROUND_MT_output")
+        self.layout.menu("SOFTGROUND_MT_output", icon="EXPORT")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
