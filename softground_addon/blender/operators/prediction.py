@@ -26,6 +26,8 @@ from ..state import state
 
 SOON = 0.03
 """Time from the drawing that finds something changed until it is worked out anew [s]."""
+AT_REST = 0.3
+"""Time without a change after which the depth is worked out from all contacts, in place of a sample [s]."""
 
 PART = 0.025
 """What is worked on before Blender has its turn again, beside the step that is being done when it is over [s]."""
@@ -102,6 +104,7 @@ def _prediction(uid: int, known: Analysis | None, wanted: BakeSettings) -> Depth
         return None
     depth = analysis.known_depth(known, wanted)
     if depth is None:
+        _stop_refining()
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)
         return DepthPrediction(known, state.shown_depths.get(uid), is_current=False)
@@ -171,23 +174,53 @@ def _work_out() -> float | None:
     if live.is_answering():
         return SOON
     if not state.predicting:
-        scenes = {window.scene for window in bpy.context.window_manager.windows}
         for work in (analysis.working_out_depth, settling):  # the last is done first
-            state.predicting.extend(work(scene) for scene in scenes if analysis.known(scene))
+            state.predicting.extend(work(scene) for scene in _shown_scenes())
+    if not _is_done(state.predicting):
+        return PAUSE
+    if not state.aims and not bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.register(_refine, first_interval=AT_REST)
+    return PAUSE if state.aims else None
+
+
+def _refine() -> float | None:
+    """Press all contacts, where the depths that are shown come from a sample of them."""
+    if live.is_answering():
+        return AT_REST
+    if not state.refining:
+        state.refining.extend(analysis.pressing_all(scene) for scene in _shown_scenes())
+    return None if _is_done(state.refining) else PAUSE
+
+
+def _stop_refining() -> None:
+    """Leave what is refined to the next time that nothing changes."""
+    state.refining.clear()
+    if bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.unregister(_refine)
+
+
+def _shown_scenes() -> list[bpy.types.Scene]:
+    """Scenes in windows whose shot is known."""
+    scenes = {window.scene for window in bpy.context.window_manager.windows}
+    return [scene for scene in scenes if analysis.known(scene)]
+
+
+def _is_done(work: list[jobs.Job[None]]) -> bool:
+    """Work for a part of a turn, from the last job on; return whether all is done, which is drawn."""
     until = time.perf_counter() + PART
-    while state.predicting:
-        if next(state.predicting[-1], _ENDED) is _ENDED:
-            state.predicting.pop()
+    while work:
+        if next(work[-1], _ENDED) is _ENDED:
+            work.pop()
         elif time.perf_counter() > until and not bpy.app.background:
-            return PAUSE
+            return False
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
-    return PAUSE if state.aims else None
+    return True
 
 
 def unregister() -> None:
     """Work nothing out any more."""
-    for timer in (_work_out, look_anew):
+    for timer in (_work_out, _refine, look_anew):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -192,6 +192,20 @@ def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = 
     return state.depths[key]
 
 
+def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
+    """Press every contact into the scene's material, where its depth comes from a sample of them."""
+    wanted, uid = settings.snapshot(scene), scene.session_uid
+    analysis = known(scene, wanted)
+    if analysis is None or analysis.terms != _terms(wanted) or analysis.contacts.is_in(*_key(wanted, analysis)[1:]):
+        return
+    work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
+    contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
+    if state.analyses.get(uid) is analysis:
+        state.analyses[uid] = analysis = replace(analysis, contacts=contacts)
+        state.depths.clear()
+        state.depths[_key(wanted, analysis)] = contacts.typical
+
+
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:
     """The expected depth [m] if it was asked for since anything has changed that it depends on. Only looks."""
     return state.depths.get(_key(wanted, analysis)) if analysis.terms == _terms(wanted) else None
