@@ -237,11 +237,11 @@ class SOFTGROUND_OT_open_settings(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
+        character, shown = active_character(options), None
         if self.of == "GROUND" and options.ground is not None:
             shown = baked_ground.display_mesh_of(options.ground)
-        else:  # a ground that is not there yet has its settings beside those of the character
-            character = active_character(options)
-            shown = character and settings.body_of(character)
+        elif character:  # a ground that is not there yet has its settings beside those of the character
+            shown = settings.body_of(character)
         if shown is None:
             raise InputError("Add a character first")
         if shown.name not in context.view_layer.objects or not shown.visible_get():
