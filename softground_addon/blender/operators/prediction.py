@@ -9,20 +9,25 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
+from bpy.props import FloatProperty
 
 from ...core.composers.prediction import matching_modulus, next_modulus
 from ...core.errors import InputError
-from ...core.ground.deep_ground import wading
 from ...core.loads.cell_limits import Fineness
 from ...core.motion.motion import shortest_sole
 from ...core.settings import BakeSettings
+from ...core.soles.deep_ground import wading
 from .. import jobs, session, settings
 from ..live import live
+from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..reading.analysis import Analysis
 from ..state import state
+from ..translation import translated
+from .modal_job import ReadingShot, Reports
 
 SOON = 0.03
 """Time from the drawing that finds something changed until it is worked out anew [s]."""
@@ -56,7 +61,7 @@ class DepthPrediction:
     depth : float or None
         Of the typical print to expect [m], as it was known last.
     is_current : bool
-        Whether nothing has changed since.
+        True if nothing has changed since.
     """
 
     analysis: Analysis
@@ -224,3 +229,50 @@ def unregister() -> None:
     for timer in (_work_out, _refine, look_anew):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
+
+
+class SOFTGROUND_OT_predict_depth(ReadingShot):
+    """Read the animation and predict how deep the prints will be, before any bake. Esc cancels"""
+
+    bl_idname = "softground.predict_depth"
+    bl_label = "Predict Depth"
+    cancelled = "Predict Depth cancelled"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        analysis.forget()
+        known = yield from analysis.reading(scene)
+        depth = yield from analysis.working_out_depth(scene)
+        deepest = known.contacts.depths.max(initial=0.0)
+        text = translated(
+            "Typical step: {typical} cm deep; the deepest: {deepest} cm",
+            typical=f"{(depth or 0.0) * 100:.1f}",
+            deepest=f"{deepest * 100:.1f}",
+        )
+        return [("INFO", text)]
+
+
+class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
+    """Set the stiffness of the ground so that the typical step is as deep as you type"""
+
+    bl_idname = "softground.match_depth"
+    bl_label = "Match Depth"
+    bl_options = {"REGISTER", "UNDO"}
+
+    depth: FloatProperty(
+        name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        depth = analysis.expected_depth(settings.scene_of(context))
+        if depth:
+            self.depth = depth * 100
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_predict_depth, SOFTGROUND_OT_match_depth)

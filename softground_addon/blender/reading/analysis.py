@@ -93,7 +93,7 @@ def look_again() -> None:
 
 
 def is_empty() -> bool:
-    """Return whether no shot is known."""
+    """True if no shot is known."""
     return not state.analyses
 
 
@@ -200,10 +200,11 @@ def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
         return
     work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
-    if state.analyses.get(uid) is analysis:
-        state.analyses[uid] = analysis = replace(analysis, contacts=contacts)
+    latest: Analysis | None = state.analyses.get(uid)
+    if latest is analysis:
+        state.analyses[uid] = renewed = replace(analysis, contacts=contacts)
         state.depths.clear()
-        state.depths[_key(wanted, analysis)] = contacts.typical
+        state.depths[_key(wanted, renewed)] = contacts.typical
 
 
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:

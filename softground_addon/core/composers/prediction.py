@@ -98,7 +98,7 @@ class ShotContacts:
     beneath: list[int]
 
     def is_in(self, material: GroundMaterial, pressure: Pressure) -> bool:
-        """Return whether they were pressed into this material by this pressure."""
+        """True if they were pressed into this material by this pressure."""
         return (self.ground.material, self.ground.pressure) == (material, pressure)
 
 
