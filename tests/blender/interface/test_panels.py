@@ -462,8 +462,10 @@ def test_a_preset_of_one_s_own_comes_back_as_it_was_saved(shot, user_folder):
     bpy.ops.softground.save_preset(name="Beach at Noon", source="measured with a stick")
     (path,) = user_folder.glob("*.json")
     assert presets.load(path).source == "measured with a stick"
+    assert "Remove Ground Preset" in rows_of_the_menu()[0]
     bpy.ops.softground.load_preset(name="Snow")
     assert not bpy.ops.softground.remove_preset.poll()
+    assert "Remove Ground Preset" not in rows_of_the_menu()[0]
     bpy.ops.softground.load_preset(filepath=str(path))
     assert shot.softground.material.youngs_modulus == pytest.approx(123e3)
     bpy.ops.softground.remove_preset()
