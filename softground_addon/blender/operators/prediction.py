@@ -22,6 +22,7 @@ from .. import jobs, session, settings
 from ..live import live
 from ..reading import analysis
 from ..reading.analysis import Analysis
+from ..remedies import said
 from ..state import state
 
 SOON = 0.03
@@ -134,7 +135,7 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     except InputError as error:
         if bpy.app.background:
             raise  # Blender writes it to the console
-        message = str(error)
+        message = said(error)
         bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
 
 

@@ -78,7 +78,7 @@ class Capture:
 
     def __post_init__(self) -> None:
         if not self.labels or not len(self.points):
-            raise InputError("the file holds no markers: record or export it with its trajectories")
+            raise InputError("the file holds no markers: record or export it with its trajectories", "no_markers")
 
 
 def check_length(frames: int, rate: float) -> None:
@@ -86,11 +86,15 @@ def check_length(frames: int, rate: float) -> None:
     low, high = RATES
     if not low <= rate <= high:
         raise InputError(
-            f"the file has a frame rate of {rate:g} Hz, not {low:g} to {high:,.0f}: export it again with it"
+            f"the file has a frame rate of {rate:g} Hz, not {low:g} to {high:,.0f}: export it again with it",
+            "frame_rate",
+            rate=rate,
         )
     if frames > MOST_FRAMES:
         raise InputError(
-            f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export a part of it, or fewer frames per second"
+            f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export a part of it, or fewer frames per second",
+            "too_many_frames",
+            frames=frames,
         )
 
 
@@ -119,4 +123,6 @@ def metres(unit: str) -> float:
     try:
         return LENGTHS[unit.strip().lower()]
     except KeyError:
-        raise InputError(f"the file's unit of length is {unit!r}: export it in {', '.join(LENGTHS)}") from None
+        raise InputError(
+            f"the unit of length is {unit!r}, not {', '.join(LENGTHS)}", "unknown_unit", unit=unit
+        ) from None

@@ -66,6 +66,7 @@ def skin_check(
                 "error",
                 f"The skin of '{motion.name}' rests {abs(over) * 100:.1f} cm {side} '{ground}'",
                 f"move the ground {ground_way} by as much, or the character {body_way}.",
+                {"character": motion.name, "height": round(over, 4)},
             )
         )
     else:
@@ -90,7 +91,8 @@ def level_on_slope(
             "level_on_slope",
             "error",
             f"The feet of '{motion.name}' stand level where '{ground}' slopes by {np.degrees(np.arccos(slope)):.0f}°",
-            "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+            "on stairs, take a mesh of them for the ground; on a hill, turn the feet to the slope.",
+            {"character": motion.name, "slope": round(float(np.arccos(slope)), 4)},
         )
     ]
 
@@ -175,7 +177,8 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
                 "on",
-                "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
+                "check that its contacts are the parts that touch the ground.",
+                {"character": motion.name, "frames": alone, "steps": seen},
             )
         )
     rests = touching.rests
@@ -187,7 +190,8 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact in Advanced > Contacts.",
+                "add what rests there to its contacts.",
+                {"character": motion.name, "frames": len(missed), "frame": float(frames[missed[0]])},
             )
         )
     return findings

@@ -39,11 +39,17 @@ def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: 
         if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
-                f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
+                f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug.",
+                "wrong_volume",
+                sole=footprint.sole,
+                frame=footprint.start_frame,
             )
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
         if footprint.max_depth_m > (deepest * depth.max() + fallen) * (1 + DEPTH_TOLERANCE):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
-                "was written. Please report this as a bug."
+                "was written. Please report this as a bug.",
+                "deeper_than_layer",
+                sole=footprint.sole,
+                frame=footprint.start_frame,
             )

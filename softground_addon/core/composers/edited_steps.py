@@ -153,7 +153,8 @@ class EditedSteps:
                 self._known[edits] = yield from without_warnings(self._pressed(edits))
             except _DAMAGE as error:
                 raise InputError(
-                    f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
+                    f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again.",
+                    "damaged_record",
                 ) from None
         return self._known[edits]
 
@@ -302,7 +303,8 @@ class EditedSteps:
         if baked is None:
             raise InputError(
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
-                "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again."
+                "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again.",
+                "too_many_vertices",
             )
         steps = grid_of(footprint).shifted(baked.steps(footprint.load_frames), edit.shift_frames)
         other = sole_of(edit, baked.pressing, self._feet)
@@ -320,7 +322,8 @@ class EditedSteps:
         if layout.window(self._cells).cells > most:
             raise InputError(
                 f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
-                f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
+                f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again.",
+                "damaged_record",
             )
         return layout
 

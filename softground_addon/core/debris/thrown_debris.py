@@ -56,7 +56,8 @@ def thrown(
         return (yield from without_warnings(_thrown(record, ground, surface, cell_size, gravity)))
     except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
         raise InputError(
-            f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
+            f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again.",
+            "damaged_record",
         ) from None
 
 

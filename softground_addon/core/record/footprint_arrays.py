@@ -135,7 +135,8 @@ def from_arrays(
             _check(footprint)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
-            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
+            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again.",
+            "damaged_record",
         ) from None
     return footprints
 

@@ -268,7 +268,9 @@ _EDITS = "The stored record's edits of steps"
 
 
 def _damaged(error: BaseException) -> InputError:
-    return InputError(f"The stored record of the footprints is damaged ({error}): clear the bake and bake again.")
+    return InputError(
+        f"The stored record of the footprints is damaged ({error}): clear the bake and bake again.", "damaged_record"
+    )
 
 
 def _text(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
@@ -282,7 +284,8 @@ def _text(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
     if version != FORMAT and version not in MIGRATIONS:
         raise InputError(
             f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
-            f"to {FORMAT}: bake again, or update SoftGround."
+            f"to {FORMAT}: bake again, or update SoftGround.",
+            "newer_record",
         )
     if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
         raise ValueError("it has parts that no record has")

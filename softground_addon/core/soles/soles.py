@@ -126,7 +126,7 @@ def anatomical_sole(
         If the length is not a positive number.
     """
     if not (np.isfinite(length) and length > 0):
-        raise InputError(f"The sole '{name}' would be {length} m long: give it a positive size.")
+        raise InputError(f"The sole '{name}' would be {length} m long: give it a positive size.", "sole_length")
     breadth = FOOT_BREADTH * length
     medial = {"L": -1.0, "R": 1.0}.get(side, 0.0) if medial is None else medial
     outline = _smooth_loop(_outline_for(medial)) * (length, breadth)
@@ -193,7 +193,9 @@ def _from_underside(
     if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
         raise InputError(
             f"The mesh of the sole '{name}' has no underside: it needs faces that look down when it stands. "
-            "Give the sole another object, or let it use the foot bones."
+            "Give the sole another object, or let it use the foot bones.",
+            "no_underside",
+            sole=name,
         )
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
@@ -205,7 +207,9 @@ def _from_underside(
     if not loops:
         raise InputError(
             f"The mesh of the sole '{name}' has no underside larger than a point. "
-            "Give the sole another object, or let it use the foot bones."
+            "Give the sole another object, or let it use the foot bones.",
+            "no_underside",
+            sole=name,
         )
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
     placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
@@ -248,7 +252,7 @@ def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: 
         If it has no faces.
     """
     if not len(triangles):
-        raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.")
+        raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.", "no_faces")
     hard = Prop(np.asarray(vertices, dtype=float), triangles)
     prop = dataclasses.replace(hard, give=give * hard.size)
     landmarks = supports(prop.probes)
