@@ -14,6 +14,7 @@ from ._core.capture.skeleton import Skeleton, skeleton_of
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
 from ._core.motion.people import likely_mass
+from ._core.motion.units import scale_to_metres, wrong_unit
 from ._core.numerics.slices import result_of
 from ._core.rig.bare_body import bare_body, body_motion, recorded, with_toes
 from ._core.rig.bones import RestBone
@@ -118,7 +119,7 @@ class Body:
                 "missing_joints",
                 missing=missing,
             )
-        count = len(paths[_NEEDED[0]])
+        count = max(len(paths[_NEEDED[0]]), 2)  # a motion has two frames at least
         check_length(count, rate)
         wrong = [joint for joint, path in paths.items() if path.shape != (count, 3) or not np.isfinite(path).all()]
         if wrong:
@@ -177,6 +178,11 @@ class Body:
             SceneUnits(skeleton.rate, 1.0, GRAVITY, 1.0),
         )
         motion = result_of(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
+        if motion.four_legged and len(mapping.soles) == 2:
+            hands = [SoleSource(f"hand.{s.upper()}", s.upper(), mapping.joints[f"wrist_{s}"][0]) for s in "lr"]
+            paws = [replace(paw, limb=True, toe_bone="") for paw in (*mapping.soles, *hands)]
+            mapping = replace(mapping, soles=tuple(paws))
+            motion = result_of(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
         return _weighed(motion, mass, 0.0, plates)
 
     @classmethod
@@ -249,6 +255,11 @@ def _weighed(motion: CharacterMotion, mass: float | None, volume: float, plates:
     source = "given"
     if mass is None:
         mass, source = likely_mass(volume or np.inf, motion.size, two_legs=motion.two_legs)
+        if not np.isfinite(mass):
+            raise InputError(f"nothing tells what '{motion.name}' weighs: give its mass in kg", "mass", mass=None)
+    if scale_to_metres(motion.size) != 1.0 and (source != "given" or motion.two_legs):
+        wrong = f"'{motion.name}' is {motion.size:.3g} m large, as of a file in {wrong_unit(motion.size)}: give metres"
+        raise InputError(wrong, "wrong_unit", size=motion.size, factor=scale_to_metres(motion.size))
     if not (np.isfinite(mass) and mass > 0):
         raise InputError(f"the mass of '{motion.name}' is {mass:g} kg: give a positive mass in kg", "mass", mass=mass)
     weighed = replace(motion, mass=float(mass))

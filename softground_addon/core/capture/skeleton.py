@@ -60,7 +60,7 @@ class Skeleton:
     bones : tuple of Bone
         Parents before their children.
     poses : (F, B, 4, 4) float array
-        Bone to world [m].
+        Bone to world [m]: y from its head to its tail, x as `Bone.x_axis`.
     rate : float
         Frames per second [Hz].
     """
