@@ -83,7 +83,7 @@ def test_a_file_that_ezc3d_wrote_holds_its_markers_and_the_force_of_two_plates(t
     x, y = np.array((100.0, 200.0)) - middle
     channels = np.array([0, 0, -700, 700 * y, 700 * x, 0, 5, 0, -300, 0, 0, 0])  # y of the plates is -y here
     file["data"]["analogs"] = np.tile(channels[None, :, None], (1, 1, FRAMES * SAMPLES)).astype(float)
-    corners = np.stack([CORNERS, CORNERS + (700, 0, 0)], axis=-1).transpose(1, 0, 2)[:, [3, 2, 1, 0]]
+    corners = np.stack([CORNERS, CORNERS + np.array([700, 0, 0])], axis=-1).transpose(1, 0, 2)[:, [3, 2, 1, 0]]
     plates = {"USED": [2], "TYPE": [2, 2], "ZERO": [1, 0], "CORNERS": corners, "ORIGIN": np.zeros((3, 2))}
     for name, value in (plates | {"CHANNEL": np.arange(1.0, 13.0).reshape(2, 6).T}).items():
         file.add_parameter("FORCE_PLATFORM", name, value)
