@@ -43,6 +43,12 @@ def joined(message: str, remedy: str) -> str:
     return f"{message}{' ' if message.endswith('.') else ': '}{remedy}" if remedy else message
 
 
+def damaged_record(error: BaseException, what: str = "record") -> InputError:
+    """Error about what a bake has left in a file."""
+    message = f"The stored {what} of the footprints is damaged ({error}): clear the bake and bake again."
+    return InputError(message, "damaged_record")
+
+
 def damaged(origin: str, what: str) -> InputError:
     """Error about what is written somewhere, such as in a file of a preset."""
     return InputError(f"{origin}: {what}", "damaged_text", origin=origin)

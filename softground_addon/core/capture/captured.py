@@ -85,17 +85,10 @@ def check_length(frames: int, rate: float) -> None:
     """Raise InputError for more frames than `MOST_FRAMES`, or a rate [Hz] beyond `RATES`; before arrays are made."""
     low, high = RATES
     if not low <= rate <= high:
-        raise InputError(
-            f"the file has a frame rate of {rate:g} Hz, not {low:g} to {high:,.0f}: export it again with it",
-            "frame_rate",
-            rate=rate,
-        )
+        raise InputError(f"a frame rate of {rate:g} Hz is not {low:g} to {high:,.0f} Hz", "frame_rate", rate=rate)
     if frames > MOST_FRAMES:
-        raise InputError(
-            f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export a part of it, or fewer frames per second",
-            "too_many_frames",
-            frames=frames,
-        )
+        message = f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export fewer"
+        raise InputError(message, "too_many_frames", frames=frames)
 
 
 def bridged(path: Array) -> Array:

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, damaged_record
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
@@ -152,10 +152,7 @@ class EditedSteps:
             try:
                 self._known[edits] = yield from without_warnings(self._pressed(edits))
             except _DAMAGE as error:
-                raise InputError(
-                    f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again.",
-                    "damaged_record",
-                ) from None
+                raise damaged_record(error, "motion") from None
         return self._known[edits]
 
     def _pressed(self, edits: frozenset[Change]) -> Slices[_Group]:

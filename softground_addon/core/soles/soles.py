@@ -191,12 +191,7 @@ def _from_underside(
     used = vertices[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
     extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside: it needs faces that look down when it stands. "
-            "Give the sole another object, or let it use the foot bones.",
-            "no_underside",
-            sole=name,
-        )
+        raise _no_underside(name, ": it needs faces that look down when it stands")
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
     heights, coverage, samples = underside_map(
@@ -205,12 +200,7 @@ def _from_underside(
     loops = trace_loops(coverage, grid.origin, grid.spacing)
     loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
     if not loops:
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside larger than a point. "
-            "Give the sole another object, or let it use the foot bones.",
-            "no_underside",
-            sole=name,
-        )
+        raise _no_underside(name, " larger than a point")
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
     placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
     first = _MARGIN * SUPERSAMPLING + SUPERSAMPLING // 2
@@ -218,6 +208,11 @@ def _from_underside(
     drawn = samples[first:rows, first:columns]
     bend = 0.0 if ball is None or toe_weight is None else _bend(used, toe_weight[np.unique(triangles)], ball_x)
     return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T, bend=bend))
+
+
+def _no_underside(name: str, why: str) -> InputError:
+    remedy = "Give the sole another object, or let it use the foot bones."
+    return InputError(f"The mesh of the sole '{name}' has no underside{why}. {remedy}", "no_underside", sole=name)
 
 
 def _bend(vertices: Array, toe_weight: Array, ball: float) -> float:
