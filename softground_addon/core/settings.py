@@ -25,9 +25,6 @@ from .weather.felt_weather import FeltWeather
 
 DOWN = (0.0, 0.0, -1.0)
 
-TIME_LIMIT = "Time Limit in Properties > Physics > Mesh and Look, or --set longest_bake=N"
-"""By what the user sets `BakeSettings.longest_bake_s`."""
-
 
 class Acts(IntEnum):
     """First stage that a setting acts on, in the order of a bake: a later one leaves what came before as it is."""

@@ -40,6 +40,7 @@ from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of, read_shot, settings_of
+from ..remedies import worded
 from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
@@ -156,7 +157,7 @@ def bake(
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=published.error if published else None,
-        findings=[*findings, *of_responses, *refused],
+        findings=worded([*findings, *of_responses, *refused]),
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):

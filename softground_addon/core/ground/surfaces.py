@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import InputError
+from ..errors import damaged
 
 HOUR = 3600.0
 
@@ -347,4 +347,4 @@ def find(name: object, origin: str = "Ground") -> SurfaceRecord:
     """
     if isinstance(name, str) and name in SURFACES:
         return SURFACES[name]
-    raise InputError(f"{origin}: 'surface' is {name!r}; it must be one of {', '.join(SURFACES)}.")
+    raise damaged(origin, f"'surface' is {name!r}; it must be one of {', '.join(SURFACES)}.")

@@ -81,7 +81,7 @@ def test_feet_that_stand_level_on_a_slope_want_stairs_and_not_a_ground_of_anothe
     loads = replace(loads, contacts=replace(loads.contacts, normal=normal))
     findings = findings_of(loads, Slope(slope=0.4))
     assert findings.keys() == {code}
-    assert ("slopes by 22°" in findings[code].message) == ("Use Selected" in findings[code].remedy) == (not turned)
+    assert ("slopes by 22°" in findings[code].message) == ("mesh of them" in findings[code].remedy) == (not turned)
     skeleton = replace(loads, motion=replace(loads.motion, skin=None, stature=STATURE))
     assert findings_of(skeleton, Slope(slope=0.4)).keys() == ({"level_on_slope"} if not turned else set())
 
