@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,12 +111,13 @@ class NodeGraph:
         self.link(selection, node.inputs["Selection"])
         return node.outputs["Geometry"]
 
-    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
-        """Put the selected vertices elsewhere."""
+    def put(self, geometry: Any, selection: Any, position: Any = None, offset: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Put the selected vertices elsewhere, from where they are if no position is given."""
         node = self.node("GeometryNodeSetPosition")
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])
-        self.link(position, node.inputs["Position"])
+        if position is not None:
+            self.link(position, node.inputs["Position"])
         self.link(offset, node.inputs["Offset"])
         return node.outputs["Geometry"]
 
@@ -139,15 +140,17 @@ class NodeGraph:
         self.link(value, node.inputs["Value"])
         return node.outputs["Geometry"]
 
-    def captured(self, geometry: Any, *numbers: Number, kind: str = "FLOAT") -> tuple[Any, list[Number]]:
-        """The geometry with numbers or vectors that are computed together and once, and these as it has them."""
-        node = self.node("GeometryNodeCaptureAttribute", domain="POINT")
+    def captured(
+        self, geometry: Any, *numbers: Number, kinds: str | Sequence[str] = "FLOAT", domain: str = "POINT"
+    ) -> tuple[Any, list[Number]]:
+        """The geometry with fields, of one kind or several, computed together and once, and these as it has them."""
+        node = self.node("GeometryNodeCaptureAttribute", domain=domain)
         names = [f"Value {count}" for count in range(len(numbers))]
         if [item.name for item in node.capture_items] != names:
             if self._known is not None:
                 raise OtherGraphError
-            for name in names:
-                node.capture_items.new(kind, name)
+            for count, name in enumerate(names):
+                node.capture_items.new(kinds if isinstance(kinds, str) else kinds[count], name)
         self.link(geometry, node.inputs["Geometry"])
         for name, number in zip(names, numbers, strict=True):
             self.link(number.socket, node.inputs[name])
@@ -213,9 +216,9 @@ class NodeGraph:
         self.link(number, node.inputs["Curve Index"])
         return node
 
-    def accumulated(self, parts: Any, kind: str = "FLOAT") -> Any:
-        """A node with sums of a field over points: those before each, those up to and with it, and of all."""
-        node = self.node("GeometryNodeAccumulateField", data_type=kind, domain="POINT")
+    def accumulated(self, parts: Any, kind: str = "FLOAT", domain: str = "POINT") -> Any:
+        """A node with sums of a field over a domain: those before each, those up to and with it, and of all."""
+        node = self.node("GeometryNodeAccumulateField", data_type=kind, domain=domain)
         self.link(parts, node.inputs["Value"])
         return node
 
@@ -233,9 +236,9 @@ class NodeGraph:
         self.link(count, node.inputs["Count"])
         return node.outputs[0]
 
-    def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
+    def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR", domain: str = "POINT") -> Any:
         """Value of a field at one of a geometry's points, or at the last of them."""
-        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT", clamp=True)
+        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain=domain, clamp=True)
         self.link(geometry, node.inputs["Geometry"])
         self.link(value, node.inputs["Value"])
         self.link(index, node.inputs["Index"])
