@@ -54,7 +54,7 @@ def test_plants_that_give_way(scene, aside, most):
     bare = milliseconds(scene)
     trail = np.array([step.position[:2] for step in baked_ground.load(scene.softground.ground)[0]])
     chance = np.random.default_rng(0)
-    place = chance.uniform(trail.min(axis=0) - 0.1, trail.max(axis=0) + 0.1, (CURVES, 2)) + (aside, 0.0)
+    place = chance.uniform(trail.min(axis=0) - 0.1, trail.max(axis=0) + 0.1, (CURVES, 2)) + np.array((aside, 0.0))
     grass = hair(np.column_stack([place, np.zeros(CURVES)]))
     grass.data.set_types(type="POLY")
     modifier = lifted(grass)

@@ -197,7 +197,7 @@ def test_before_the_first_step_it_is_the_scatter_and_so_it_is_without_the_modifi
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_scatter_that_no_sole_touches_passes_as_it_is(shot, kind):
     """Not copied, and without anything stored."""
-    obj = KINDS[kind](roots() + (20.0, 0.0, 0.0))
+    obj = KINDS[kind](roots() + np.array((20.0, 0.0, 0.0)))
     before = state(obj)
     give_way(obj)
     shot.frame_set(60)
