@@ -69,14 +69,14 @@ class FloorSteps:
         films: dict[int, Array] = {}
         booked = CarriedMass()
         for sole in self.soles:
-            soft = [(meeting, -1) for meeting in self._soft_meetings(sole, steps, shed)]
+            soft = [(meeting, -1) for meeting in self.soft_meetings(sole, steps, shed)]
             all_ = sorted([*soft, *zip(sole.meetings, sole.marks, strict=True)], key=lambda each: each[0].frame)
             giving, of_sole = carry([meeting for meeting, _ in all_], carried, sole.areas, sole.dirty)
             films |= {number: film for (_, number), film in zip(all_, giving, strict=True) if number >= 0}
             booked += of_sole
         return films, booked
 
-    def _soft_meetings(
+    def soft_meetings(
         self, sole: SoleOnFloors, steps: Sequence[EditableStep], shed: Mapping[int, float]
     ) -> Iterator[Meeting]:
         """A sole as it leaves soft ground of the kind, which it does not with a last step that goes on to the end."""
