@@ -23,6 +23,8 @@ BIRTH, MASS, KIND, WETNESS, SOLE, STEP = "birth", "mass", "kind", "wetness", "so
 place along and across the sole and distance to its outline [m], number of the contact."""
 TREAD = "tread"
 """Depth of the grooves of the sole [m], 0 of bare feet."""
+PAD = "pad"
+"""Of bare feet alone, a vector; see `core.carried.marks.Marks`."""
 SHARE, ZONE = "share", "zone"
 """Share of the film on the sole that is left there, and zone of the sole: for steps that are edited."""
 NOTHING = -1.0

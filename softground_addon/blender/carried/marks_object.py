@@ -77,7 +77,7 @@ def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mappin
     if obj is None or not has_numbers(obj):
         return
     share, zone, step, before = (values(mesh, name) for name in (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS))
-    films, _ = _floors(mesh[FLOORS]).films(steps, shed)
+    films, _ = floors_of(obj).films(steps, shed)
     each = np.array([films[number] for number in range(len(films))])
     mass = _or_nothing(each[step.astype(int), zone.astype(int)] * share, step.astype(int))
     place = mesh_arrays.positions(mesh)
@@ -95,10 +95,10 @@ def values(mesh: Any, name: str) -> NDArray[np.float64]:
     return numbers.astype(float)
 
 
-def surface_of(obj: bpy.types.Object) -> surfaces.SurfaceRecord | surfaces.Liquid:
-    """What marks are of."""
+def floors_of(obj: bpy.types.Object) -> FloorSteps:
+    """Steps on hard floors from which marks follow."""
     mesh: Any = obj.data
-    return surfaces.sticking(_floors(mesh[FLOORS]).kind)
+    return _floors(mesh[FLOORS])
 
 
 def has_numbers(obj: bpy.types.Object) -> bool:
@@ -224,6 +224,7 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
         (nodes.STEP, "INT", marks.step),
         (nodes.SOLE, "FLOAT_VECTOR", marks.sole),
     )
-    mesh_arrays.add_attributes(mesh, columns)
+    pads = ((nodes.PAD, "FLOAT_VECTOR", marks.pad),) if marks.pad.any() else ()
+    mesh_arrays.add_attributes(mesh, (*columns, *pads))
     mesh.update()
     return mesh

@@ -12,6 +12,7 @@ from mathutils.bvhtree import BVHTree
 from mathutils.geometry import barycentric_transform
 
 from ...core.carried.ageing import aged
+from ...core.ground import surfaces
 from ...core.meshing.uv_raster import rasterise
 from ...core.numerics.arrays import Array, Indices
 from ...core.record.footprints import NEVER
@@ -56,7 +57,8 @@ class FloorImage:
 
     def at(self, frame: float) -> Array:
         """Mass [kg/m²], wet look from 1 to 0, and time since the latest mark [s], (N + 1, 3); last, of all others."""
-        surface, sliders = marks_object.surface_of(self.marks), marks_object.sliders_of(self.marks)
+        surface = surfaces.sticking(marks_object.floors_of(self.marks).kind)
+        sliders = marks_object.sliders_of(self.marks)
         there = (self.birth <= frame) & (self.mass > 0)
         place, seconds = self.place[there], (frame - self.birth[there]) / self.frame_rate
         passed = seconds * sliders["Time Scale"]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..ground import surfaces
 from ..numerics.arrays import Array
@@ -86,3 +89,22 @@ class FloorSteps:
                 continue
             if (step.footprint.surface or self.ground) == self.kind and step.footprint.end_frame < sole.last_frame:
                 yield Meeting(step.footprint.end_frame, shed=shed.get(step.index, 0.0) * density)
+
+    def with_films(self, table: Sequence[Mapping[str, Any]], steps: Sequence[EditableStep]) -> list[dict[str, Any]]:
+        """Events with what soles bring to hard floors, as `events.COLUMNS` have it."""
+        carried = surfaces.sticking(self.kind).carried
+        assert carried is not None
+        films, _ = self.films(steps, {})
+        rows = [{"carried": "", "film": 0.0, **row} for row in table]
+        for sole in self.soles:
+            frames = np.array([meeting.frame for meeting in sole.meetings])
+            thickest = [
+                films[number].max() / carried.most if number >= 0 else float(meeting.shares is None)
+                for number, meeting in zip(sole.marks, sole.meetings, strict=True)
+            ]
+            for row in rows:
+                at = int(np.searchsorted(frames, row["frame"] + 1.0)) - 1  # it begins within a step of the solver
+                is_here = row["surface"] == surfaces.HARD and (row["character"], row["contact"]) == sole.of
+                if is_here and at >= 0 and thickest[at]:
+                    row.update(carried=carried.kind, film=round(float(thickest[at]), 4))
+        return rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from types import MappingProxyType
@@ -20,7 +20,7 @@ from ..ground.terrain import SAME_LAYER
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
-from ..motion.sole_motion import SoleMotion
+from ..motion.sole_motion import Sole, SoleMotion
 from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
@@ -55,6 +55,8 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
+    pad : (V, 3) float array
+        Under bare feet, as of `relief.tread.PADS`: ahead over length, left of a right foot over breadth, breadth [m].
     share : (V,) float array
         Of the film on the sole that is left there.
     zone : (V,) int array
@@ -70,6 +72,7 @@ class Marks:
     area: Array
     sole: Array
     tread: Array
+    pad: Array
     step: NDArray[np.intp]
     share: Array
     zone: NDArray[np.intp]
@@ -94,11 +97,27 @@ class _Contact:
     wet: str
 
 
+@dataclass(frozen=True)
+class _Under:
+    """Underside of a sole: the depth of its grooves [m], and itself where it is bare."""
+
+    tread: float
+    bare: Sole | None
+
+    def pads(self, places: Array) -> Array:
+        """Places (N, 3) of `SoleGrid` as `Marks.pad` has them."""
+        if self.bare is None:
+            return np.zeros_like(places)
+        along, across, _ = places.T
+        left = across * (-1.0 if self.bare.side == "L" else 1.0) / self.bare.breadth
+        return np.stack([along / self.bare.length - 0.5, left, np.full(len(places), self.bare.breadth)], axis=-1)
+
+
 _Mark = dict[str, Any]
 """The faces of a mark, and the values of its vertices, as `Marks` has them."""
 _NOTHING: _Mark = {
     **dict.fromkeys(("birth", "mass", "area", "tread", "share"), np.zeros(0)),
-    **dict.fromkeys(("position", "sole"), np.zeros((0, 3))),
+    **dict.fromkeys(("position", "sole", "pad"), np.zeros((0, 3))),
     **{"zone": np.zeros(0, np.intp), "faces": np.zeros((0, 4), np.intp)},
 }
 
@@ -112,6 +131,7 @@ def marks_of(
     surface: str,
     shed: Mapping[int, float] = MappingProxyType({}),
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
+    bare: Collection[tuple[str, str]] = (),
     brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
@@ -128,6 +148,8 @@ def marks_of(
         Volume that each step sheds in the air, by its number [m³].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
+    bare : collection of (str, str), optional
+        Feet without shoes, whose toes show.
     brought : mapping of str to float, optional
         Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
     """
@@ -138,7 +160,7 @@ def marks_of(
     sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
-    laid_out: list[tuple[Sequence[_Contact], SoleOnFloors, float]] = []
+    laid_out: list[tuple[Sequence[_Contact], SoleOnFloors, _Under]] = []
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             yield
@@ -157,7 +179,7 @@ def marks_of(
             if contacts:
                 areas = np.max([_by_zone(each.grid, each.grid.area) for each in contacts], axis=0)
                 sole = SoleOnFloors(of, areas, float(character.motion.frames[-1]), dirty, (), ())
-                laid_out.append((contacts, sole, treads.get(of, 0.0)))
+                laid_out.append((contacts, sole, _Under(treads.get(of, 0.0), motion.sole if of in bare else None)))
     whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
     return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
@@ -165,7 +187,7 @@ def marks_of(
 def _of_kind(
     kind: SurfaceRecord | Liquid,
     ground: str,
-    laid_out: Sequence[tuple[Sequence[_Contact], SoleOnFloors, float]],
+    laid_out: Sequence[tuple[Sequence[_Contact], SoleOnFloors, _Under]],
     steps: Sequence[EditableStep],
     shed: Mapping[int, float],
 ) -> Marks:
@@ -173,7 +195,7 @@ def _of_kind(
     assert kind.carried is not None
     parts: list[_Mark] = []
     soles = []
-    for contacts, sole, tread in laid_out:
+    for contacts, sole, under in laid_out:
         meetings, marks = [], []
         for contact in sorted(contacts, key=lambda each: each.frames[0]):
             is_wet = contact.wet == kind.name
@@ -181,7 +203,7 @@ def _of_kind(
             of_zones = _by_zone(contact.grid, share * contact.grid.area) / np.maximum(sole.areas, 1e-300)
             meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), None if is_wet else of_zones))
             marks.append(-1 if is_wet else len(parts))
-            parts += [] if is_wet else [_mark(contact, share, tread)]
+            parts += [] if is_wet else [_mark(contact, share, under)]
         dirty = sole.dirty if kind.name == ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = FloorSteps(kind.name, ground, tuple(soles))
@@ -281,7 +303,7 @@ def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(contact: _Contact, share: Array, tread: float) -> _Mark:
+def _mark(contact: _Contact, share: Array, under: _Under) -> _Mark:
     """The mark of one contact that leaves a share at each node of its grid."""
     grid = contact.grid
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
@@ -292,7 +314,8 @@ def _mark(contact: _Contact, share: Array, tread: float) -> _Mark:
         "mass": np.zeros(len(used)),
         "area": grid.area[used],
         "sole": grid.sole[used],
-        "tread": np.full(len(used), tread),
+        "tread": np.full(len(used), under.tread),
+        "pad": under.pads(grid.sole[used]),
         "share": share[used],
         "zone": grid.zone[used],
     }

@@ -8,6 +8,7 @@ import pytest
 
 from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid, swept
 from softground_addon.core.carried.marks import _pieces, marks_of
+from softground_addon.core.events.events import events
 from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.surfaces import LIQUIDS
@@ -243,6 +244,22 @@ def test_a_step_that_is_shifted_before_earlier_contacts_with_the_floor_leaves_ma
     moved, usual = found.with_steps(early, {}), marks()
     assert moved.carried == usual.carried
     assert np.sort(moved.mass[moved.mass > 0]) == pytest.approx(np.sort(usual.mass[usual.mass > 0]))
+
+
+def test_events_on_a_floor_know_what_soles_bring_less_with_each_step_and_none_if_steps_are_muted():
+    loads, footprints, _ = crossing()
+    table = events([loads], footprints, surface="mud", first_frame=1.0)
+    steps, found = steps_of(footprints, {}, {}, {}), marks()
+    rows = found.floors.with_films(table, steps)
+    hard = [row for row in rows if row["surface"] == "hard" and row["phase"] == "heel_strike"]
+    assert len(hard) > 3
+    assert {row["carried"] for row in hard} == {"mud"}
+    for contact in {row["contact"] for row in hard}:
+        film = [row["film"] for row in hard if row["contact"] == contact]
+        assert np.diff(film).max() < 0
+    assert not [row for row in rows if row["surface"] != "hard" and row["carried"]]
+    muted = [replace(step, footprint=None) for step in steps]
+    assert not any(row["film"] for row in found.floors.with_films(table, muted))
 
 
 @pytest.mark.parametrize("ground", ["sand", "snow"])
