@@ -95,6 +95,7 @@ def marks_of_record(
             shed=shed_volumes(debris) if debris is not None else {},
             treads={} if is_bare else dict.fromkeys(feet, made_with.tread_m),
             bare=feet if is_bare else (),
+            carried=made_with.carried,
             brought={character.name: character.dirty_soles for character in made_with.characters},
         )
     )

@@ -129,7 +129,7 @@ def _floors(text: str) -> FloorSteps:
         )
         fixed = {"of": tuple(sole["of"]), "areas": np.array(sole["areas"]), "meetings": meetings}
         soles.append(SoleOnFloors(**{**sole, **fixed}))
-    return FloorSteps(said["kind"], said["ground"], tuple(soles))
+    return FloorSteps(said["kind"], said["ground"], tuple(soles), tuple(said.get("scaled", (1.0, 1.0))))
 
 
 def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:

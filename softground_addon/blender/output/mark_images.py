@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -102,19 +103,20 @@ def floor_images(
 
 def _uv_of(floor: bpy.types.Object, place: list[Vector], near: float) -> Array:
     """Places (N, 2) in the UV map of a floor, NaN where it is not near [Blender units] or has none."""
-    shown = floor.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    shown: Any = floor.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh, found = shown.to_mesh(), np.full((len(place), 2), np.nan)
     layer = next((each for each in mesh.uv_layers if each.active_render), None) if mesh else None
     if layer is not None:
-        corners = [Vector((*each.vector, 0.0)) for each in layer.uv]
-        at = [floor.matrix_world @ vertex.co for vertex in mesh.vertices]
+        corners = [each.vector.to_3d() for each in layer.uv]
+        at: list[Any] = [floor.matrix_world @ vertex.co for vertex in mesh.vertices]
+        mesh.calc_loop_triangles()
         triangles = [(tuple(each.vertices), tuple(each.loops)) for each in mesh.loop_triangles]
         tree = BVHTree.FromPolygons(at, [of_vertices for of_vertices, _ in triangles])
         for number, point in enumerate(place):
             on, _, triangle, _ = tree.find_nearest(point, near)
             if on is not None:
                 of_vertices, of_corners = triangles[triangle]
-                ends = *(at[each] for each in of_vertices), *(corners[each] for each in of_corners)
+                ends = [at[each] for each in of_vertices] + [corners[each] for each in of_corners]
                 found[number] = barycentric_transform(on, *ends)[:2]
     shown.to_mesh_clear()
     return found

@@ -61,7 +61,12 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "marks")
         if options.marks and (character := active_character(options)):
             column.prop(character, "dirty_soles")
-        if options.marks and options.ground is not None and (marks := marks_object.of(options.ground)):
+        marks = marks_object.of(options.ground) if options.marks and options.ground is not None else None
+        if options.marks and (marks or settings.hard_grounds_of(options)):
+            row = column.row(align=True)
+            row.prop(options, "carried_amount")
+            row.prop(options, "carried_reach")
+        if marks:
             for name, field in marks_object.fields_of(marks):
                 column.prop(*field, text=name)
 

@@ -255,8 +255,8 @@ def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Pa
         leans.append(lean)
         shares.append(share)
     share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
-    fields = (leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground)
-    vertices, captured = graph.captured(vertices, *map(graph.number, fields), kinds="VECTOR")
+    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground
+    vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
     return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
 
 
@@ -302,15 +302,17 @@ def _given_way(
     remain, bent, bent_further = graph.parts(share)
     is_worn = chance.above(remain)
     lean = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean)
-    beside = (part.fraction() - 0.5 for part in _in_cells(graph, table, root.socket))
-    along, across, height = (part * by for part, by in zip(graph.parts(ground), (*beside, 1.0), strict=True))
-    height = graph.choose("FLOAT", table.sinks, 0.0, (along + across + height).socket)
+    beside = [part.fraction() - 0.5 for part in _in_cells(graph, table, root.socket)]
+    slope_x, slope_y, level = graph.parts(ground)
+    height = level + slope_x * beside[0] + slope_y * beside[1]
+    height = graph.choose("FLOAT", table.sinks, 0.0, height.socket)
     shift = graph.scaled(table.cell_up, height)
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
     fields = (graph.number(lean), graph.number(shift), bent + bent_further * is_worn)
     changed, captured = graph.captured(found, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
-    moved = _Moved(*(number.socket for number in captured), is_touched.socket)
+    lean, shift, bent = (number.socket for number in captured)
+    moved = _Moved(lean, shift, bent, is_touched.socket)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
     return graph.choose("GEOMETRY", touched.socket, geometry, move(changed, moved))
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..ground import surfaces
+from ..ground.surfaces import CarriedFilm
 from ..numerics.arrays import Array
 from ..record.record import EditableStep
 from .film import CarriedMass, Meeting, carry
@@ -51,11 +52,21 @@ class FloorSteps:
     kind, ground : str
         What they carry, and what the ground is made of where a step does not say.
     soles : sequence of SoleOnFloors
+    scaled : (float, float)
+        As of `CarriedFilm.scaled`.
     """
 
     kind: str
     ground: str
     soles: tuple[SoleOnFloors, ...]
+    scaled: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def carried(self) -> CarriedFilm:
+        """The film that sticks."""
+        usual = surfaces.sticking(self.kind).carried
+        assert usual is not None
+        return usual.scaled(*self.scaled)
 
     def films(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> tuple[dict[int, Array], CarriedMass]:
         """The film (4,) of which each mark takes its share [kg/m²], and all that is carried.
@@ -67,8 +78,7 @@ class FloorSteps:
         shed : mapping of int to float
             Volume that each sheds in the air, by its number [m³].
         """
-        carried = surfaces.sticking(self.kind).carried
-        assert carried is not None
+        carried = self.carried
         films: dict[int, Array] = {}
         booked = CarriedMass()
         for sole in self.soles:
@@ -92,8 +102,7 @@ class FloorSteps:
 
     def with_films(self, table: Sequence[Mapping[str, Any]], steps: Sequence[EditableStep]) -> list[dict[str, Any]]:
         """Events with what soles bring to hard floors, as `events.COLUMNS` have it."""
-        carried = surfaces.sticking(self.kind).carried
-        assert carried is not None
+        carried = self.carried
         films, _ = self.films(steps, {})
         rows = [{"carried": "", "film": 0.0, **row} for row in table]
         for sole in self.soles:

@@ -132,6 +132,7 @@ def marks_of(
     shed: Mapping[int, float] = MappingProxyType({}),
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
     bare: Collection[tuple[str, str]] = (),
+    carried: tuple[float, float] = (1.0, 1.0),
     brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
@@ -150,6 +151,8 @@ def marks_of(
         Depth of the grooves of soles that have some, by character and sole [m].
     bare : collection of (str, str), optional
         Feet without shoes, whose toes show.
+    carried : (float, float), optional
+        How much sticks and how far it goes, as of `CarriedFilm.scaled`.
     brought : mapping of str to float, optional
         Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
     """
@@ -180,33 +183,32 @@ def marks_of(
                 areas = np.max([_by_zone(each.grid, each.grid.area) for each in contacts], axis=0)
                 sole = SoleOnFloors(of, areas, float(character.motion.frames[-1]), dirty, (), ())
                 laid_out.append((contacts, sole, _Under(treads.get(of, 0.0), motion.sole if of in bare else None)))
-    whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
+    whole = [_of_kind(kind, FloorSteps(kind.name, surface, (), carried), laid_out, steps, shed) for kind in sticking]
     return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
 
 def _of_kind(
     kind: SurfaceRecord | Liquid,
-    ground: str,
+    floors: FloorSteps,
     laid_out: Sequence[tuple[Sequence[_Contact], SoleOnFloors, _Under]],
     steps: Sequence[EditableStep],
     shed: Mapping[int, float],
 ) -> Marks:
     """All marks of one kind, and those that there would be if steps on soft ground are muted no more, or shifted."""
-    assert kind.carried is not None
     parts: list[_Mark] = []
     soles = []
     for contacts, sole, under in laid_out:
         meetings, marks = [], []
         for contact in sorted(contacts, key=lambda each: each.frames[0]):
             is_wet = contact.wet == kind.name
-            share = share_left(contact.laid.pressure, kind.carried, contact.slid)
+            share = share_left(contact.laid.pressure, floors.carried, contact.slid)
             of_zones = _by_zone(contact.grid, share * contact.grid.area) / np.maximum(sole.areas, 1e-300)
             meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), None if is_wet else of_zones))
             marks.append(-1 if is_wet else len(parts))
             parts += [] if is_wet else [_mark(contact, share, under)]
-        dirty = sole.dirty if kind.name == ground else 0.0
+        dirty = sole.dirty if kind.name == floors.ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
-    floors = FloorSteps(kind.name, ground, tuple(soles))
+    floors = replace(floors, soles=tuple(soles))
     baked = [replace(step, footprint=step.baked) for step in steps if not step.is_copy]
     at_most, _ = floors.films(baked, {})
     for sole in soles:

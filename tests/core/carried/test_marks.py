@@ -262,6 +262,18 @@ def test_events_on_a_floor_know_what_soles_bring_less_with_each_step_and_none_if
     assert not any(row["film"] for row in found.floors.with_films(table, muted))
 
 
+def test_more_may_stick_and_it_may_go_farther():
+    usual, more, farther = (mass_of_steps(marks(carried=scaled)) for scaled in ((1.0, 1.0), (2.0, 1.0), (1.0, 3.0)))
+    assert more == pytest.approx(2 * usual)
+    one_foot = slice(1, 3)  # of equal steps each leaves the same share
+    assert np.divide(*farther[one_foot]) < np.divide(*usual[one_foot])
+    assert np.count_nonzero(farther) >= np.count_nonzero(usual)
+    found = marks(carried=(2.0, 3.0))
+    carried = found.carried
+    assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
+    assert found.with_steps(steps_of(crossing()[1], {}, {}, {}), {}).mass == pytest.approx(found.mass)
+
+
 @pytest.mark.parametrize("ground", ["sand", "snow"])
 def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
     loads, footprints, terrain = crossing()
