@@ -15,7 +15,7 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.carried import marks_object
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 
 START = 2.4  # m along y; the walk is toward -y
 EDGE, END, HALF_WIDTH = 0.6, -9.0, 1.6

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.node_graph import NodeGraph
-from softground_addon.blender.node_modifiers import new_group
+from softground_addon.blender.nodes.node_graph import NodeGraph
+from softground_addon.blender.nodes.node_modifiers import new_group
 from tests.blender import shots
 from tests.blender.plants.test_give_way import give_way, hair
 
@@ -25,15 +25,11 @@ ON_THE_TRAIL, AWAY = 6.0, 2.0
 
 def lifted(obj):
     """A modifier that moves all by one vector."""
-    tree = new_group("Lift", "lift")
-    for way in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    graph = NodeGraph(tree)
-    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
+    graph = NodeGraph(new_group("Lift", "lift"))
     given = graph.node("NodeGroupInput").outputs["Geometry"]
-    graph.finish(graph.put(given, True, offset=graph.combined(0.0, 0.0, graph.math("MULTIPLY", frame, 1e-6))))
+    graph.finish(graph.put(given, True, offset=graph.combined(0.0, 0.0, graph.math("MULTIPLY", graph.frame(), 1e-6))))
     modifier = obj.modifiers.new("Lift", "NODES")
-    modifier.node_group = tree
+    modifier.node_group = graph.tree
     return modifier
 
 

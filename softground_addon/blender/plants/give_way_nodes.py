@@ -8,7 +8,7 @@ is there. What no sole has come near is only compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import pi
@@ -17,8 +17,8 @@ from typing import Any
 import bpy
 
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
-from ..node_graph import NodeGraph, Number
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Give Way"
 MARK = "softground_give_way"
@@ -42,18 +42,17 @@ _NOWHERE = 1e9
 """More vertices than a table has."""
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-INPUTS: Mapping[str, tuple[str, Any, tuple[float, float] | None, str]] = {
-    "Table": ("NodeSocketObject", None, None, "Where and when soles tread: an object that each bake writes"),
-    "Height": ("NodeSocketFloat", 0.3, (0.001, 10.0), "Height of the tallest plants, from which on soles bend them"),
-    "Stiffness": ("NodeSocketFloat", 0.15, (0.0, 1.0), "Share of the bend that springs back as the sole leaves"),
-    "Recovery": ("NodeSocketFloat", 240.0, (0.1, 86400.0), "Seconds in which plants rise to 1/e of their bend"),
-    "Breaks": ("NodeSocketFloat", 0.3, (0.0, 10.0), "How much stays bent for good: 1 is all of it from 150 kPa on"),
-    "Half After": ("NodeSocketFloat", 150.0, (1.0, 10_000.0), "Passes after which half of the plants are worn down"),
-    "Stands": ("NodeSocketBool", True, None, "Plants that bend; off for what lies on the ground and tilts with it"),
-    "Sinks": ("NodeSocketBool", True, None, "Press roots into the prints; off where the scatter follows the ground"),
-    "Loose Parts": ("NodeSocketBool", False, None, "Bend each separate part of a mesh about its lowest vertices"),
-}
-"""What the group asks for: kind of socket, value at first, range, meaning."""
+INPUTS = (
+    GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
+    GroupInput("Height", 0.3, "Height of the tallest plants, from which on soles bend them", (0.001, 10.0)),
+    GroupInput("Stiffness", 0.15, "Share of the bend that springs back as the sole leaves", (0.0, 1.0)),
+    GroupInput("Recovery", 240.0, "Seconds in which plants rise to 1/e of their bend", (0.1, 86400.0)),
+    GroupInput("Breaks", 0.3, "How much stays bent for good: 1 is all of it from 150 kPa on", (0.0, 10.0)),
+    GroupInput("Half After", 150.0, "Passes after which half of the plants are worn down", (1.0, 10000.0)),
+    GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
+    GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
+    GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+)
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
@@ -63,20 +62,9 @@ def ensure_group() -> Any:
     known = next((group for group in bpy.data.node_groups if is_give_way(group) and not group.library), None)
     if known is not None:
         return known
-    tree: Any = new_group(GROUP, MARK)
-    graph = NodeGraph(tree)
-    interface = tree.interface
-    for way in ("INPUT", "OUTPUT"):
-        interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    for name, (kind, value, span, meaning) in INPUTS.items():
-        socket = interface.new_socket(name, in_out="INPUT", socket_type=kind)
-        socket.description = meaning
-        if value is not None:
-            socket.default_value = value
-        if span:
-            socket.min_value, socket.max_value = span
+    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
     _fill(graph)
-    return tree
+    return graph.tree
 
 
 def is_give_way(tree: Any) -> bool:
@@ -119,7 +107,7 @@ class _Table:
 
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
-    frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+    frame = graph.number(graph.frame())
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
     table = _table(graph, chosen)
     graph.next_row()
@@ -128,7 +116,7 @@ def _fill(graph: NodeGraph) -> None:
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
-    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+    position = graph.position()
     root, move = _at(graph, position, first, "POINT"), partial(_put, graph, table, position)
     geometry = _given_way(graph, table, passes, given, "CURVE", root, move)
     graph.next_row()
@@ -145,17 +133,14 @@ def _fill(graph: NodeGraph) -> None:
 
 
 def _table(graph: NodeGraph, chosen: Any) -> _Table:
-    info = graph.node("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    graph.link(chosen["Table"], info.inputs["Object"])
+    info = graph.node("GeometryNodeObjectInfo", {"Object": chosen["Table"]}, transform_space="RELATIVE")
     vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
-    inverted, origin = graph.node("FunctionNodeInvertMatrix"), graph.node("FunctionNodeTransformPoint")
-    graph.link(to_scatter, inverted.inputs["Matrix"])
-    graph.link((0.0, 0.0, 0.0), origin.inputs["Vector"])
-    graph.link(inverted.outputs["Matrix"], origin.inputs["Transform"])
+    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter}).outputs["Matrix"]
+    origin = graph.node("FunctionNodeTransformPoint", {"Vector": (0.0, 0.0, 0.0), "Transform": inverted})
     ways = [_turned(graph, way, to_scatter) for way in _UNITS]
     cell_up, each = ways[2], graph.math("DIVIDE", 1.0, graph.vector("LENGTH", ways[2], output="Value"))
     ways = [graph.scaled(way, each) for way in ways]
-    back = [graph.parts(_turned(graph, way, inverted.outputs["Matrix"])) for way in _UNITS]
+    back = [graph.parts(_turned(graph, way, inverted)) for way in _UNITS]
     axes = [graph.combined(*(way[number].socket for way in back)) for number in (0, 1)]
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
@@ -166,18 +151,14 @@ def _table(graph: NodeGraph, chosen: Any) -> _Table:
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
-    node = graph.node("FunctionNodeTransformDirection")
-    graph.link(direction, node.inputs["Direction"])
-    graph.link(by, node.inputs["Transform"])
-    return node.outputs["Direction"]
+    inputs = {"Direction": direction, "Transform": by}
+    return graph.node("FunctionNodeTransformDirection", inputs).outputs["Direction"]
 
 
 def _at(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOAT_VECTOR") -> Any:
     """Value of a field at one of the elements of the geometry that it is of."""
-    node = graph.node("GeometryNodeFieldAtIndex", data_type=kind, domain=domain)
-    graph.link(value, node.inputs["Value"])
-    graph.link(index, node.inputs["Index"])
-    return node.outputs["Value"]
+    inputs = {"Value": value, "Index": index}
+    return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
 
 
 @dataclass(frozen=True)
@@ -344,17 +325,15 @@ def _put(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _
 
 def _instances_moved(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _Moved) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
-    turned = graph.node("FunctionNodeRotateVector")
-    graph.link((0.0, 0.0, 1.0), turned.inputs["Vector"])
-    graph.link(graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"], turned.inputs["Rotation"])
+    rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
+    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": rotation})
     stem, level = turned.outputs["Vector"], graph.scaled(table.up, graph.dot(moved.lean, table.up))
     toward = graph.vector("NORMALIZE", graph.vector("SUBTRACT", moved.lean, level))
     to_lie = graph.math("ARCCOSINE", graph.dot(stem, toward))
     axes = (graph.vector("CROSS_PRODUCT", *ways) for ways in ((stem, toward), (table.up, moved.lean)))
     to_lie = graph.number(graph.choose("FLOAT", table.stands, to_lie, pi / 2))
-    rotation = graph.node("FunctionNodeAxisAngleToRotation")
-    graph.link(graph.choose("VECTOR", table.stands, *axes), rotation.inputs["Axis"])
-    graph.link((graph.number(moved.bent) * to_lie).socket, rotation.inputs["Angle"])
+    turn = {"Axis": graph.choose("VECTOR", table.stands, *axes), "Angle": (graph.number(moved.bent) * to_lie).socket}
+    rotation = graph.node("FunctionNodeAxisAngleToRotation", turn)
     rotated, shifted = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
     for node, name, value in (
         (rotated, "Rotation", rotation.outputs["Rotation"]),
