@@ -120,6 +120,7 @@ def bake(
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
     findings = [*prints.findings, *said, *edit_findings(record), *response_job.keyed_responses(wanted)]
     of_responses = response_findings(prints.responses)
+    rows = as_edited(happened, record.steps, record.laid_carves)
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -130,7 +131,7 @@ def bake(
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, record.steps, record.laid_carves),
+        events=marks.floors.with_films(rows, record.steps) if marks else rows,
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)

@@ -20,7 +20,7 @@ Turchet, Serafin, Dimitrov and Nordahl 2010, "Physically based sound synthesis a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import damaged
 
@@ -153,6 +153,11 @@ class CarriedFilm:
     taken: float
     deposited: float
     water: float
+
+    def scaled(self, amount: float, reach: float) -> CarriedFilm:
+        """The film that is so many times as thick, and of which each step deposits 1/reach."""
+        deposited = min(self.deposited / reach, 1.0)
+        return replace(self, most=self.most * amount, taken=self.taken * amount, deposited=deposited)
 
 
 CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
