@@ -19,6 +19,7 @@ from ..numerics.slices import Slices
 from ..record.footprints import Footprint
 from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
+from .contact_check import contact_check
 
 OFF_SKIN = 0.012
 """The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
@@ -74,7 +75,9 @@ def skin_check(
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
-    return findings
+    yield
+    known = {finding.code for finding in findings}
+    return findings + [new for new in contact_check(character, skin, rise, has_ground) if new.code not in known]
 
 
 def level_on_slope(
