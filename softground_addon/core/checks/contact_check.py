@@ -9,11 +9,10 @@ import numpy as np
 
 from ..findings import Finding, listed
 from ..loads.estimate import CharacterLoads
-from ..loads.sliding import treadmill_velocity
 from ..motion.motion import LowSkin
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array, Mask
-from ..numerics.intervals import runs
+from ..numerics.intervals import close_short, runs
 from ..skin.merging import ALIKE
 from ..skin.skin_motion import CALM_SPEED
 
@@ -48,7 +47,8 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     rate = len(skin.frames) / (skin.frames[-1] - skin.frames[0] + 1) * motion.frame_rate
     slow = float(np.clip(np.sqrt(motion.leg_length), 1.0, SLOWEST)) * rate
     longest = max(LONGEST * slow, LEAST_FRAMES)
-    rests = on_ground & (np.abs(rise) < NEAR) & (skin.rise < CALM_SPEED * skin.height) & _still(character, skin, rate)
+    rests = on_ground & (np.abs(rise) < NEAR) & (skin.rise < CALM_SPEED * skin.height)
+    rests &= _still(skin, rests, rate)
     numbers = {sole.sole.name: number for number, sole in enumerate(motion.soles)}
     owner = np.array([numbers.get(name, -1) for name in skin.soles])
     absent: dict[str, int] = {}
@@ -73,18 +73,18 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
 
 
 def _first(name: str, state: Mask, longest: float) -> dict[str, int]:
-    """The first step of a state that lasts for more than `longest` steps, by a name."""
-    start, end = runs(state)
+    """The first step of a state that lasts for more than `longest` steps, by a name; feet that tremble interrupt it."""
+    start, end = runs(close_short(state, int(longest / 2) + 1))
     lasts = np.flatnonzero(end - start > longest)
     return {name: int(start[lasts[0]])} if len(lasts) else {}
 
 
-def _still(character: CharacterLoads, skin: LowSkin, rate: float) -> Mask:
+def _still(skin: LowSkin, rests: Mask, rate: float) -> Mask:
     """True while parts go with the ground, or with the belt of a body on the spot, before or after a frame, (F, P)."""
     lag = min(max(round(SHORTEST * rate), 1), len(skin.frames) - 1)  # feet that tremble stand
-    belt = treadmill_velocity(character.motion, character.contacts)[:2]
-    ways = skin.position[lag:, :, :2] - skin.position[:-lag, :, :2]
-    speed = np.linalg.norm(ways * (rate / lag) - belt, axis=-1)
+    ways = (skin.position[lag:, :, :2] - skin.position[:-lag, :, :2]) * (rate / lag)
+    belt = np.median(ways[rests[lag:] & rests[:-lag]], axis=0) if skin.on_the_spot else np.zeros(2)
+    speed = np.linalg.norm(ways - belt, axis=-1)
     before, after = np.full((2, *skin.rise.shape), np.inf)
     before[lag:], after[:-lag] = speed, speed
     return np.minimum(before, after) < skin.calm
