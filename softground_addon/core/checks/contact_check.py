@@ -18,8 +18,8 @@ from ..skin.skin_motion import CALM_SPEED
 
 NEAR, ALOFT = 0.015, 0.03
 """Calm skin below the first height over the ground rests, a part above the second is in the air, in body heights."""
-LONGEST, LEAST_FRAMES = 0.08, 2
-"""Longest disagreement of skin and contact [s], two frames at 24 Hz, for legs up to a metre."""
+LONGEST, LEAST_FRAMES = 0.067, 2
+"""Longest disagreement of skin and contact [s], two frames at 30 Hz, for legs up to a metre."""
 SLOWEST = 2.0
 """How many times as long it may be for the largest, whose legs swing slower."""
 SHORTEST = 0.04

@@ -110,6 +110,34 @@ def test_every_foot_of_a_random_animal_prints_when_it_stands_and_the_self_check_
     assert not {seed: (animal.wrong, animal.findings) for seed, animal in animals.items() if not animal.named}
 
 
+@pytest.mark.parametrize("seed", [1016, 1032, 1056])
+def test_the_self_check_names_a_contact_that_is_absent_late_early_or_double(addon, seed):
+    animal = seen(Animal.drawn(seed))
+    assert not animal.wrong and not animal.findings
+    loads, number = animal.loads, seed % len(animal.loads.motion.soles)
+    contacts, sole = loads.contacts, loads.motion.soles[number]
+    late = round(0.25 * len(contacts.touching) / Animal.drawn(seed).cycles)
+    on = contacts.touching[:, number]
+    for changed in (np.zeros_like(on), np.where(np.arange(len(on)) < late, False, np.roll(on, late)), on | True):
+        touching = contacts.touching.copy()
+        touching[:, number] = changed
+        wrong = replace(loads, contacts=replace(contacts, touching=touching))
+        assert any(f"'{sole.sole.name}'" in finding.message for finding in checked(wrong, animal.shot))
+    beside = np.array(sole.transforms[:])
+    beside[..., 1, 3] += 0.3 * sole.sole.breadth
+    twin = replace(sole, sole=replace(sole.sole, name="again"), transforms=beside)
+    both = {name: with_twin(getattr(contacts, name), number) for name in ("touching", "clearance", "normal", "offset")}
+    wrong = replace(loads, motion=replace(loads.motion, soles=(*loads.motion.soles, twin)))
+    (double,) = checked(replace(wrong, contacts=replace(contacts, **both)), animal.shot)
+    assert double.code == "foot_twice" and sole.sole.name in double.message and "again" in double.message
+
+
+def with_twin(values, number):
+    """Arrays of contacts with one of them again at their end."""
+    axis = 0 if values.ndim == 1 else 1
+    return np.concatenate([values, np.take(values, [number], axis)], axis)
+
+
 @pytest.mark.parametrize(("size", "period"), [(0.12, 0.57), (7.4, 2.1), (1.0, 3.0)])
 def test_a_walk_on_the_spot_is_one_however_slow_it_is(addon, size, period):
     """Its feet slide no faster than those of others that stand."""
