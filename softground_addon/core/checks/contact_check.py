@@ -16,7 +16,7 @@ from ..numerics.intervals import close_short, runs
 from ..skin.merging import ALIKE
 from ..skin.skin_motion import CALM_SPEED
 
-NEAR, ALOFT = 0.015, 0.03
+NEAR, ALOFT = 0.015, 0.02
 """Calm skin below the first height over the ground rests, a part above the second is in the air, in body heights."""
 LONGEST, LEAST_FRAMES = 0.067, 2
 """Longest disagreement of skin and contact [s], two frames at 30 Hz, for legs up to a metre."""
@@ -57,7 +57,7 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         of_sole, on = owner == number, touching[:, number]
         name = motion.soles[number].sole.name
         absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, longest)
-        aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), longest)
+        aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
     for part in np.flatnonzero((owner < 0) & rests.any(axis=0)):
         alone = rests[:, part] & ~_beside(character, skin.position[:, part, :2], touching)
         absent |= _first(skin.bones[part] or motion.name, alone, max(RESTS * slow, LEAST_FRAMES))

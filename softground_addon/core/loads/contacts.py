@@ -166,8 +166,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Slices[Contact
     # What a limb that rolls turns to the ground has no speed of its own; and calm skin on the ground bears where
     # nothing else does.
     limb = np.array([sole.sole.prop is not None for sole in motion.soles])
-    shown = _shown(touching, seen)
-    touching = np.where(limb, touching if seen.aloft is None else touching & ~seen.aloft, shown)
+    touching = np.where(limb, touching, _shown(touching, seen))
     touching |= seen.touching & (limb | ~touching.any(axis=1, keepdims=True))
     return Contacts(touching, offset, normal, clearance, seen.aloft)
 
