@@ -116,7 +116,7 @@ def test_no_answer_can_be_right_for_a_run_whose_skin_is_never_calm_on_the_ground
 
 @pytest.mark.parametrize("clip", [("rigs", "robot_run")], indirect=True)
 def test_the_step_of_a_robot_that_the_oracle_misses_is_the_one_that_holds_it_up(clip):
-    """Its foot falls through the floor and out of it, and is never calm; while it is down the robot is thrown up again."""
+    """Its foot goes through the floor and is never calm; while it is down the robot is thrown up again."""
     step = clip.unseen()
     during = np.arange(int(step["frame_start"]), int(step["frame_end"]) + 1)
     foot = np.sign(clip.skin[..., 0]) == np.sign(step["position"][0])

@@ -13,6 +13,7 @@ from ..motion.motion import LowSkin
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import close_short, runs
+from ..numerics.slices import Slices
 from ..skin.merging import ALIKE
 from ..skin.skin_motion import CALM_SPEED
 
@@ -30,7 +31,7 @@ TOGETHER = 0.5
 """Share of the rarer one's time for which two contacts of one foot both touch, and of their breadth within which."""
 
 
-def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_ground: Mask) -> list[Finding]:
+def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_ground: Mask) -> Slices[list[Finding]]:
     """Findings that name contacts and bones.
 
     Parameters
@@ -54,11 +55,13 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     absent: dict[str, int] = {}
     aloft: dict[str, int] = {}
     for number in np.unique(owner[owner >= 0]):
+        yield
         of_sole, on = owner == number, touching[:, number]
         name = motion.soles[number].sole.name
         absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, longest)
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
     for part in np.flatnonzero((owner < 0) & rests.any(axis=0)):
+        yield
         alone = rests[:, part] & ~_beside(character, skin.position[:, part, :2], touching)
         absent |= _first(skin.bones[part] or motion.name, alone, max(RESTS * slow, LEAST_FRAMES))
     findings = [*_doubled(character, skin.height)]

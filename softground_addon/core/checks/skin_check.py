@@ -75,9 +75,9 @@ def skin_check(
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
-    yield
+    named = yield from contact_check(character, skin, rise, has_ground)
     known = {finding.code for finding in findings}
-    return findings + [new for new in contact_check(character, skin, rise, has_ground) if new.code not in known]
+    return findings + [finding for finding in named if finding.code not in known]
 
 
 def level_on_slope(

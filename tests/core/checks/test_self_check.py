@@ -108,15 +108,16 @@ def test_each_contact_is_judged_by_its_own_skin_and_named():
     apart = np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [-0.4, 0.0, 0.0]])
     loads = named(stands(apart, apart[:2]), ("foot.L", "foot.R", "tail"), ("left", "right", ""))
     said = findings_of(loads)
-    assert said.keys() == {"skin_without_step"} and said["skin_without_step"].severity == "warning"
+    assert said.keys() == {"skin_without_step"}
+    assert said["skin_without_step"].severity == "warning"
     assert "'tail' of" in said["skin_without_step"].message
-    near = apart + [[0, 0, 0], [0, 0, 0], [0.35, 0.1, 0]]  # a heel of the left foot
+    near = np.add(apart, [[0, 0, 0], [0, 0, 0], [0.35, 0.1, 0]])  # a heel of the left foot
     assert not findings_of(named(stands(near, apart[:2]), ("foot.L", "foot.R", "heel"), ("left", "right", "")))
     touching = loads.contacts.touching.copy()
     touching[:, 1] = False
     missing = replace(loads, contacts=replace(loads.contacts, touching=touching))
     assert "'right', 'tail' of" in findings_of(missing)["skin_without_step"].message
-    aloft = apart[:2] + [[0, 0, 0.1], [0, 0, 0]]
+    aloft = np.add(apart[:2], [[0, 0, 0.1], [0, 0, 0]])
     over = named(stands(aloft, apart[:2]), ("foot.L", "foot.R"), ("left", "right"))
     assert "'left' of" in findings_of(over)["step_without_skin"].message
 
