@@ -19,6 +19,7 @@ from ..numerics.slices import Slices
 from ..record.footprints import Footprint
 from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
+from .contact_check import contact_check
 
 OFF_SKIN = 0.012
 """Largest distance of the ground from resting skin, in body heights: 2 cm for an adult, the compliance of a shoe."""
@@ -75,7 +76,9 @@ def skin_check(
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
-    return findings
+    named = yield from contact_check(character, skin, rise, has_ground)
+    known = {finding.code for finding in findings}
+    return findings + [finding for finding in named if finding.code not in known]
 
 
 def level_on_slope(
