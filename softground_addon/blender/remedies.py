@@ -19,6 +19,7 @@ REMEDIES = {
     "step_without_skin": "check in Properties > Physics > Contacts that its contacts are the parts that touch the "
     "ground.",
     "skin_without_step": "add what rests there with Add Contact in Feet.",
+    "foot_twice": "remove one of them in Properties > Physics > Contacts.",
     "edit_without_step": "The edit is kept for when the step comes back; Reset All Steps drops it.",
     "no_legs": "Complete its joints in Properties > Physics > Body Bones.",
     "carving": "Or turn Carve off, or raise Time Limit in Properties > Physics > Mesh and Look.",

@@ -66,12 +66,12 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         absent |= _first(skin.bones[part] or motion.name, alone, max(RESTS * slow, LEAST_FRAMES))
     findings = [*_doubled(character, skin.height)]
     for parts, code, what, remedy in (
-        (absent, "skin_without_step", "rests on the ground without a print", "add what rests there with Add Contact"),
-        (aloft, "step_without_skin", "prints while its skin is in the air", "check that each bone is what touches"),
+        (absent, "skin_without_step", "rests on the ground without a print", "add what rests there to its contacts."),
+        (aloft, "step_without_skin", "prints while its skin is in the air", "check that each bone is what touches the ground."),
     ):
         if parts:
             message = f"{listed(parts)} of '{motion.name}' {what}, from frame {skin.frames[min(parts.values())]:.0f} on"
-            findings.append(Finding(code, "warning", message, f"{remedy} in Advanced > Contacts."))
+            findings.append(Finding(code, "warning", message, remedy, {"character": motion.name, "parts": [*parts]}))
     return findings
 
 
@@ -115,7 +115,8 @@ def _doubled(character: CharacterLoads, height: float) -> Iterator[Finding]:
     ]
     if pairs:
         message = f"{listed(pairs[0])} of '{motion.name}' press the same place at the same time: one foot, twice"
-        yield Finding("foot_twice", "warning", message, "remove one of them in Advanced > Contacts.")
+        remedy = "remove one of them from its contacts."
+        yield Finding("foot_twice", "warning", message, remedy, {"character": motion.name, "contacts": pairs[0]})
 
 
 def _are_one(this: SoleMotion, other: SoleMotion, on: Mask, also: Mask, height: float) -> bool:
