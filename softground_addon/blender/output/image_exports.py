@@ -27,7 +27,7 @@ from .. import mesh_arrays
 from ..debris import debris_object
 from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
-from .exports import baked_display_mesh, written_by_blender
+from .exports import baked_display_mesh, counted, written_by_blender
 
 DISPLACEMENT, MASK, WEATHER, DEBRIS = "displacement", "mask", "weather", "debris"
 """Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,
@@ -115,7 +115,7 @@ def export_images(
             water = water_at(relief, len(x))
             points = weathered_points.weathered_points(ground, position, over_time, water, units.unit_scale_m)
             at = open_.enter_context(points)
-        for frame in range(start, end + 1):
+        for frame in counted(start, end):
             height, compression = over_time.movement.at(frame, len(x)).T
             rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), units.frame_rate)
             kinds: dict[str, tuple[Array, ...]] = {}
