@@ -101,9 +101,7 @@ def test_a_bake_under_weather_takes_at_most_a_tenth_longer(scene, preset):
                 bpy.ops.softground.add_weather()
             elif bpy.ops.softground.remove_weather.poll():
                 bpy.ops.softground.remove_weather()
-            started = time.process_time()
-            jobs.run(bake_job.bake(scene))
-            taken.append(time.process_time() - started)
+            taken.append(_anew(scene))
     without, with_weather = min(seconds[False]), min(seconds[True])
     below(f"a bake under weather over one without, {preset}", with_weather / without, 1.1)
 
@@ -124,7 +122,7 @@ def walk_in_snow(scene, frames):
     return seconds_to_bake(scene)
 
 
-@pytest.mark.parametrize("frames", [96, 800])
+@pytest.mark.parametrize("frames", [96, 400])
 def test_a_bake_on_the_ground_of_the_first_takes_little_longer(scene, frames):
     first = walk_in_snow(scene, frames)
     again = min(_anew(scene) for _ in range(3))
