@@ -54,8 +54,8 @@ def many_steps(radius=ON_NEW_GROUND):
 
 def memory_per_step(radius):
     """By how much the largest memory of a bake grows with each further step [bytes]."""
-    few, many = few_steps(radius), many_steps(radius)
-    return (many["memory"] - few["memory"]) / (many["steps"] - few["steps"])
+    few, large = few_steps(radius), many_steps(radius)
+    return (large["memory"] - few["memory"]) / (large["steps"] - few["steps"])
 
 
 def test_the_size_of_the_ground_does_not_change_the_time_of_a_bake():
