@@ -29,7 +29,7 @@ from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
-from .exports import baked_display_mesh, written_by_blender
+from .exports import baked_display_mesh, counted, written_by_blender
 from .mark_images import FloorImage, floor_images
 
 DISPLACEMENT, MASK, WEATHER, DEBRIS, MARKS = "displacement", "mask", "weather", "debris", "marks"
@@ -121,7 +121,7 @@ def export_images(
             water = water_at(relief, len(x))
             points = weathered_points.weathered_points(ground, position, over_time, water, units.unit_scale_m)
             at = open_.enter_context(points)
-        for frame in range(start, end + 1):
+        for frame in counted(start, end):
             height, compression = over_time.movement.at(frame, len(x)).T
             rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), units.frame_rate)
             kinds: dict[str, tuple[Array, ...]] = {}

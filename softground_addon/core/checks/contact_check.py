@@ -67,7 +67,7 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     findings = [*_doubled(character, skin.height)]
     for parts, code, what, remedy in (
         (absent, "skin_without_step", "rests on the ground without a print", "add what rests there to its contacts."),
-        (aloft, "step_without_skin", "prints while its skin is in the air", "check that each bone is what touches the ground."),
+        (aloft, "step_without_skin", "prints while its skin is in the air", "check the bone of each."),
     ):
         if parts:
             message = f"{listed(parts)} of '{motion.name}' {what}, from frame {skin.frames[min(parts.values())]:.0f} on"
