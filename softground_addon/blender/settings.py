@@ -229,6 +229,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
+        carried=(typed(options.carried_amount), typed(options.carried_reach)),
         gravity_direction=gravity_direction_of(scene),
         **_set_for(options, units, options.ground if has_ground else None, options),
         grounds=_further_grounds(options, units),
@@ -246,6 +247,11 @@ def _calm(options: Any, surface: str, units: SceneUnits) -> FeltWeather:
 def is_prop(character: Any) -> bool:
     """True if an entry of the characters is of objects without a rig."""
     return not (character.armature or character.body) and any(sole.object for sole in character.soles)
+
+
+def body_of(character: Any) -> bpy.types.Object | None:
+    """The object that stands for a character: its armature, its body, or the prop itself."""
+    return character.armature or character.body or next((sole.object for sole in character.soles if sole.object), None)
 
 
 def is_set_up(character: Any) -> bool:

@@ -40,6 +40,7 @@ from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, read_shot, settings_of
+from ..remedies import worded
 from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
@@ -158,7 +159,7 @@ def bake(
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=max((each.error for each in published if each), default=None),
-        findings=[*findings, *of_responses, *refused],
+        findings=worded([*findings, *of_responses, *refused]),
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):

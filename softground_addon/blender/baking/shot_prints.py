@@ -91,8 +91,11 @@ class ShotPrints:
     @property
     def events(self) -> list[Event]:
         """Events of all steps as they are edited."""
-        rows = [as_edited(each.happened, each.record.steps, each.record.laid_carves) for each in self.grounds]
-        return in_order(row for of_ground in rows for row in of_ground)
+        rows = []
+        for each in self.grounds:
+            of_ground = as_edited(each.happened, each.record.steps, each.record.laid_carves)
+            rows += each.marks.floors.with_films(of_ground, each.record.steps) if each.marks else of_ground
+        return in_order(rows)
 
     @property
     def carried(self) -> CarriedMass | None:
