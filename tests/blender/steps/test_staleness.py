@@ -472,8 +472,8 @@ def test_what_a_rigged_character_leans_on_is_compared_as_well(scene, change, mes
 
 def test_another_blender_compares_what_it_knows_as_the_one_that_baked(rigged):
     mesh = baked_ground.display_mesh_of(rigged.softground.ground).data
-    noted = json.loads(mesh[staleness.FINGERPRINTS])
-    mesh[staleness.FINGERPRINTS] = json.dumps(noted | {"version": "4.1", "surface": "0", "movement:Walker": "0"})
+    noted = json.loads(mesh[staleness.BUILD_STAMP])
+    mesh[staleness.BUILD_STAMP] = json.dumps(noted | {"version": "4.1", "surface": "0", "movement:Walker": "0"})
     assert bake_report.stale_reasons(rigged) == ()
     change_mass(rigged)
     assert bake_report.stale_reasons(rigged) == ("The settings have changed",)
