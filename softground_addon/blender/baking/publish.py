@@ -10,7 +10,7 @@ from functools import partial
 import bpy
 
 from ...core.carried.marks import Marks, marks_of
-from ...core.composers.relief_plan import BARS, relief_at, shod_of
+from ...core.composers.relief_plan import BARS, FLESH, relief_at, shod_of
 from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
 from ...core.ground.heightfield import Terrain
@@ -86,7 +86,8 @@ def marks_of_record(
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
         return None
-    shod = shod_of(made_with.inputs(), record.footprints) if made_with.tread_m > 0 else ()
+    is_bare = made_with.tread_pattern == FLESH
+    feet = shod_of(made_with.inputs(), record.footprints) if made_with.tread_m > 0 or is_bare else ()
     return (
         yield from marks_of.slices(
             loads,
@@ -94,7 +95,9 @@ def marks_of_record(
             terrain,
             surface=made_with.surface,
             shed=shed_volumes(debris) if debris is not None else {},
-            treads=dict.fromkeys(shod, made_with.tread_m),
+            treads={} if is_bare else dict.fromkeys(feet, made_with.tread_m),
+            bare=feet if is_bare else (),
+            carried=made_with.carried,
             brought={character.name: character.dirty_soles for character in made_with.characters},
         )
     )
