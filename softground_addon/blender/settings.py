@@ -193,6 +193,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
+        carried=(typed(options.carried_amount), typed(options.carried_reach)),
         under=options.under,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),

@@ -195,6 +195,9 @@ class SOFTGROUND_PT_mesh(GroundPanel, bpy.types.Panel):
         row = column.row()
         row.active = options.shape_keys
         row.prop(options, "dense_shape_keys")
+        if options.marks and settings.hard_grounds_of(options):
+            column.prop(options, "carried_amount")
+            column.prop(options, "carried_reach")
 
 
 def vertices(wanted: float, most: int) -> str:

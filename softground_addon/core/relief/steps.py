@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class StepRelief:
     change: Array
     water: Array
     tread: bool = False
+
+    def scaled(self, strength: float) -> StepRelief:
+        """The same with so many times the change, in whole quanta."""
+        return replace(self, change=np.round(strength * self.change / QUANTUM) * QUANTUM)
 
 
 NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
@@ -95,7 +99,7 @@ def relief_of_steps(
     steps = []
     for footprint in footprints:
         yield
-        steps.append(_step(footprint, places, standing, water, wanted, blur_sigma))
+        steps.append(_step(footprint, places, standing, water, wanted, blur_sigma).scaled(wanted.strength))
     return steps
 
 
@@ -107,7 +111,7 @@ def _step(
     wanted: ReliefSettings,
     blur_sigma: float,
 ) -> StepRelief:
-    """Relief that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
+    """Relief of full strength that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
     if not len(footprint.contact_cells):
         return NOTHING
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
@@ -127,7 +131,7 @@ def _step(
     if of_print is None:
         return NOTHING
     relief = of_print.at(places.x[point], places.y[point])
-    change = wanted.strength * np.stack([relief.height, relief.compression], axis=-1)
+    change = np.stack([relief.height, relief.compression], axis=-1)
     change -= relief.pressed[:, None] * standing[point]
     change = np.round(change / QUANTUM) * QUANTUM
     standing[point] += change

@@ -265,3 +265,14 @@ def test_a_room_with_its_faces_inward_takes_prints_on_its_floor(short_walk):
     short_walk.frame_set(30)
     height = as_rendered(baked_ground.display_mesh_of(ground))[:, 2]
     assert -0.1 < height.min() < -0.02
+
+
+def test_a_ground_that_shows_nothing_but_instances_says_how_to_make_them_a_mesh(short_walk):
+    ground = field(short_walk)
+    tree, given, result = node_group()
+    points = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(given, points.inputs["Points"])
+    tree.links.new(given, points.inputs["Instance"])
+    tree.links.new(points.outputs[0], result)
+    ground.modifiers.new("Tiles", "NODES").node_group = tree
+    assert "let Realize Instances follow" in refusal(bpy.ops.softground.bake)
