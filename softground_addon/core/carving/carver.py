@@ -1,7 +1,8 @@
 """Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
 
-Over the pressed ground T, every cell keeps the lowest underside K that passed it and the loose matter l on it: what
-stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. A part of it all is packed into the
+Over the pressed ground T, every cell keeps the lowest undersides K that passed its quarters and the loose matter l on
+it: what stands is the mean of min(T, K), the surface lies l above that. So the outline of a hole is as smooth as shares
+of cells make it, whichever way it runs. A cut takes loose matter first. A part of it all is packed into the
 wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
 
@@ -27,6 +28,8 @@ TOLERANCE = 1e-3
 UNDER_SOLE = 0.01
 """The same of a sole that presses, or a cell if that is less: within it the print is what the solver says, and the skin
 about that [m]; where the soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+SAMPLES = 2
+"""Places along each side of a cell at which the lowest underside is known."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
 THICKEST, LAYERS = 0.04, 3
@@ -92,12 +95,12 @@ class CarvedCells:
         Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
     pressed : (rows, columns) float array
         Height of the pressed ground T, with its rims [m].
-    lowest : (rows, columns) float array
-        Lowest underside K so far [m], infinite where none passed.
+    lowest : (S, rows, columns) float array
+        Lowest underside K so far at some places of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
         Height of the loose matter [m].
     cut_height, packed, unplaced : float
-        Sums of the heights that were cut of what stood or fell, packed, and found no place around [m].
+        Sums of the heights that were cut of what stood, fell or rose as a rim, packed, and found no place around [m].
     """
 
     cell_size: float
@@ -113,8 +116,8 @@ class CarvedCells:
 
     @property
     def standing(self) -> Array:
-        """Height of what stands, (rows, columns) [m]."""
-        return np.minimum(self.pressed, self.lowest)
+        """Mean height of what stands, (rows, columns) [m]."""
+        return np.asarray(np.minimum(self.pressed, self.lowest).mean(axis=0))
 
     @property
     def surface(self) -> Array:
@@ -124,18 +127,20 @@ class CarvedCells:
     def press(self, pressed: Array) -> None:
         """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
         before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
-        self.loose += np.maximum(after - before, 0.0)
+        risen = np.maximum(after - before, 0.0).mean(axis=0)
+        self.cut_height += float(risen.sum())
+        self.loose += risen
         self.pressed = pressed
 
     def cut(
         self, underside: Array, way: Array, packing: float, bodies: Array | None = None, *, again: float | None = None
-    ) -> None:
+    ) -> Array:
         """Cut the ground to a body's underside.
 
         Parameters
         ----------
-        underside : (rows, columns) float array
-            Lowest surface of the body over each cell [m], infinite where there is none.
+        underside : (S, rows, columns) float array
+            Lowest surface of the body over each place [m], infinite where there is none.
         way : (2,) float array
             Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
         packing : float
@@ -144,23 +149,33 @@ class CarvedCells:
             Lowest surface of all bodies, if there are others: nothing is laid in them [m].
         again : float, optional
             Part of the loose matter that is packed, if not as much: what is pushed ahead is cut again at each frame.
+
+        Returns
+        -------
+        (rows, columns) float array of what was cut [m].
         """
-        standing = self.standing
+        standing = np.minimum(self.pressed, self.lowest)
         depth = standing + self.loose - underside
-        depth[self.closed | (depth < np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))] = 0.0
+        least = np.where(self.closed, np.inf, np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))
+        depth = np.where(depth >= least, depth, 0.0)
         if not depth.any():
-            return
-        of_loose = np.minimum(self.loose, depth)
-        of_standing = depth - of_loose
-        self.loose -= of_loose
+            return depth[0]
+        of_standing = np.maximum(depth - self.loose, 0.0)
         self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
+        depth, of_standing = depth.mean(axis=0), of_standing.mean(axis=0)
+        of_loose = depth - of_standing
+        self.loose = np.maximum(self.loose - of_loose, 0.0)
         self.cut_height += float(of_standing.sum())
         thrown = (1.0 - packing) * of_standing + (1.0 - (packing if again is None else again)) * of_loose
         self.packed += float((depth - thrown).sum())
-        if not thrown.any():
-            return
+        if thrown.any():
+            self._lay(thrown, way, underside.min(axis=0) if bodies is None else bodies)
+        return depth
+
+    def _lay(self, thrown: Array, way: Array, bodies: Array) -> None:
+        """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
-        under_body = (underside if bodies is None else bodies) - self.surface - TOLERANCE
+        under_body = bodies - self.surface - TOLERANCE
         remaining = float(thrown.sum())
         for most in (np.minimum(under_body, THICKEST - self.loose), under_body):
             room = np.maximum(most, 0.0)
@@ -219,7 +234,7 @@ class CarvedCells:
         loose = self.loose + change
         fallen = loose < -ROUNDING
         self.cut_height -= float(loose[fallen].sum())
-        self.lowest[fallen] = (standing + loose)[fallen]
+        self.lowest[:, fallen] = (np.minimum(self.pressed, self.lowest) + loose)[:, fallen]
         self.loose = np.maximum(loose, 0.0)
 
 

@@ -29,6 +29,8 @@ from .carved_step import CarvedStep, is_deep
 from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
 
+COARSENESS = 0.7
+"""Skin is looked at in cubes of so many cells: finer detail is lost in the ground."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -93,31 +95,32 @@ def carves_of(
     count : int
         Of the steps that bodies take; those of higher numbers are copies.
     """
-    first = next(iter(footprints.values()))
+    first, frames = next(iter(footprints.values())), skins[0][2].frames
+    deep = _deep(footprints, float(frames[0]), float(frames[-1]))
     steps = {
         number: CarvedStep(
             footprint,
-            is_deep(footprint),
+            number in deep,
             FootprintRecorder(first.cell_size, first.frame_step),
             _walls(footprint, ground, surface),
         )
         for number, footprint in footprints.items()
     }
-    frames = skins[0][2].frames
     carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
-    bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
+    size = COARSENESS * first.cell_size
+    bodies = [_Body(name, soles, skin, taken, size) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
         for body in bodies:
             yield
             around = next(body.poses)
-            low = carving.low(around)
-            for step, behind, triangles in body.parts(number):
-                if behind is not None:
-                    carving.leave(behind)
-                if step.is_deep and (part := carving.drawn(step, around, low, triangles)) is not None:
+            low, parts = carving.low(around), body.parts(number)
+            for behind in body.behind(number):
+                carving.leave(behind)
+            for walls in dict.fromkeys(step.walls for step, _ in parts):
+                if (part := carving.drawn(parts, around, low, walls)) is not None:
                     drawn.append(part)
         for part in drawn:
             yield
@@ -127,6 +130,17 @@ def carves_of(
         yield
         carving.finish(step, float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+
+
+def _deep(footprints: Mapping[int, Footprint], first: float, last: float) -> set[int]:
+    """Numbers of the deep prints; with those that an end of the shot cuts, of soles that leave deep ones."""
+    deep = {number for number, print in footprints.items() if is_deep(print)}
+    soles = {(print.character, print.sole) for number, print in footprints.items() if number in deep}
+    for number, print in footprints.items():
+        is_cut = print.start_frame < first + 1 or print.end_frame > last - 1
+        if is_cut and (print.character, print.sole) in soles:
+            deep.add(number)
+    return deep
 
 
 def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
@@ -145,21 +159,29 @@ def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
 class _Body:
     """A character's skin, part by part, and the steps that these parts take."""
 
-    def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep]) -> None:
+    def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep], size: float) -> None:
         self.poses = _poses(skin)
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
+        places = skin.at(np.zeros(1, dtype=np.intp))[0]
         for sole, triangles in skin.triangles.items():
-            taken = of_body if sole == NO_SOLE else [step for step in of_body if step.footprint.sole == soles[sole]]
+            goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
+            taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             if taken:
-                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), _coarse(triangles, places, size)))
 
-    def parts(self, number: int) -> Iterator[tuple[CarvedStep, CarvedStep | None, Indices]]:
-        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles."""
-        for sole, taken, nearest, triangles in self._parts:
-            before = nearest[max(number - 1, 0)]
-            has_left = sole != NO_SOLE and before != nearest[number]
-            yield taken[nearest[number]], taken[before] if has_left else None, triangles
+    def parts(self, number: int) -> list[tuple[CarvedStep, Indices]]:
+        """The step that each part is nearest to at a frame, and the triangles of the part."""
+        return [(taken[nearest[number]], triangles) for _, taken, nearest, triangles in self._parts]
+
+    def behind(self, number: int) -> list[CarvedStep]:
+        """The steps that soles are not nearest to any more at a frame."""
+        before = max(number - 1, 0)
+        return [
+            taken[nearest[before]]
+            for sole, taken, nearest, _ in self._parts
+            if sole != NO_SOLE and nearest[before] != nearest[number]
+        ]
 
 
 def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:
@@ -168,6 +190,17 @@ def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:
     away = np.maximum(spans[:, :1] - frames, frames - spans[:, 1:]).clip(min=0.0)
     nearest: Indices = away.argmin(axis=0)
     return nearest
+
+
+def _coarse(triangles: Indices, places: Array, size: float) -> Indices:
+    """Triangles (T, 3) between the lowest of the vertices (V, 3) in each cube of a size [m]."""
+    low = np.argsort(places[:, 2], kind="stable")
+    first, cube = np.unique(np.floor(places[low] / size), axis=0, return_index=True, return_inverse=True)[1:]
+    lowest = np.empty(len(places), dtype=np.intp)
+    lowest[low] = low[first[cube]]
+    coarse = np.unique(lowest[triangles], axis=0)
+    a, b, c = coarse.T
+    return np.asarray(coarse[(a != b) & (b != c) & (c != a)])
 
 
 def _poses(skin: RespondedSkin) -> Iterator[Array]:

@@ -22,13 +22,13 @@ def walls_of(surface, angle=None):
 
 def level(rows=60, columns=60):
     nothing, flat = np.zeros((rows, columns), bool), np.zeros((rows, columns))
-    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full(flat.shape, np.inf), flat.copy())
+    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full((4, *flat.shape), np.inf), flat.copy())
 
 
 def block(cells, low, high, bottom):
     """The underside of an upright block between two corners (row, column)."""
-    underside = np.full(cells.loose.shape, np.inf)
-    underside[low[0] : high[0], low[1] : high[1]] = bottom
+    underside = np.full((4, *cells.loose.shape), np.inf)
+    underside[:, low[0] : high[0], low[1] : high[1]] = bottom
     return underside
 
 
