@@ -16,11 +16,12 @@ from ..ground.sparse_grid import TILE, SampledGrid, Window
 from ..ground.variation import VariationTiles
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.interpolation import cubic
+from ..numerics.triangles import cross
 from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import REACH, SAMPLES, THICKEST, CarvedCells, Walls
+from .carver import HIGHEST, REACH, SAMPLES, CarvedCells, Walls
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -35,6 +36,31 @@ LEAST = round(3e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 3 mm."""
 THIN = 2e-3
 """Loose matter that comes to rest is gathered where it is thinner [m]."""
+
+
+class Part(NamedTuple):
+    """A part of a body and the step that takes it.
+
+    Attributes
+    ----------
+    triangles : (T, 3) int array
+    sides : (T,) float array
+        See `responded_skin.outsides`.
+    """
+
+    step: CarvedStep
+    triangles: Indices
+    sides: Array
+
+    def below(self, around: Array, low: Mask) -> Indices:
+        """Triangles (N, 3) that may touch the ground: low, and no upper side of the vertices (4, V, 3) around a frame."""
+        near = np.logical_or.reduce([low[corners] for corners in self.triangles.T])
+        triangles, sides = self.triangles[near], self.sides[near]
+        is_above = sides != 0
+        for places in around[1:3, :, :2]:
+            a, b, c = (places[corners] for corners in triangles.T)
+            is_above &= sides * cross(b - a, c - a) > 0
+        return triangles[~is_above]
 
 
 class Drawn(NamedTuple):
@@ -152,20 +178,18 @@ class CarvedGround:
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low: Mask = (over < self._highest + THICKEST).any(axis=0)  # what is laid in this frame heaps up
+        low: Mask = (over < self._highest + HIGHEST).any(axis=0)  # what is laid in this frame heaps up
         return low
 
-    def drawn(
-        self, parts: Sequence[tuple[CarvedStep, Indices]], around: Array, low: Mask, walls: Walls
-    ) -> Drawn | None:
-        """A body over a frame, from its vertices (4, V, 3) around it, and which are low; None if none are.
+    def drawn(self, parts: Sequence[Part], around: Array, low: Mask, walls: Walls) -> Drawn | None:
+        """The parts of a body over a frame whose ground stands alike, None if none of them is low.
 
-        Its parts are steps in ground of one kind, with the triangles that take them.
+        From its vertices (4, V, 3) around the frame, and which are low (V,).
         """
         steps, middles, passed, ways = [], [], [], []
-        for step, triangles in parts:
-            near = triangles[np.logical_or.reduce([low[corners] for corners in triangles.T])]
-            if step.is_deep and step.walls == walls and len(near):
+        for part in parts:
+            step = part.step
+            if step.is_deep and step.walls == walls and len(near := part.below(around, low)):
                 steps.append(step)
                 used, near = _numbered(near, len(low))
                 middles.append(around[2, used, :2].mean(axis=0))

@@ -32,8 +32,9 @@ SAMPLES = 2
 """Places along each side of a cell at which the lowest underside is known."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
-THICKEST, LAYERS = 0.04, 3
-"""Loose matter is laid up to this thickness [m], and under what hovers over it, in so many goes; then anywhere."""
+THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
+"""Loose matter is laid up to a thickness [m], and under what hovers over it, in so many goes; then up to twice that;
+then anywhere."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 REACH = 0.04
@@ -177,8 +178,8 @@ class CarvedCells:
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
         under_body = bodies - self.surface - TOLERANCE
         remaining = float(thrown.sum())
-        for most in (np.minimum(under_body, THICKEST - self.loose), under_body):
-            room = np.maximum(most, 0.0)
+        for thickest in (THICKEST, HIGHEST, np.inf):
+            room = np.maximum(np.minimum(under_body, thickest - self.loose), 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
                 if remaining <= ROUNDING or not (total := share.sum()):

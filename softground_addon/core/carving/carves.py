@@ -24,10 +24,10 @@ from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
 from ..record.moved_carve import placement, shifted
 from ..record.record import BakeRecord, EditableStep
-from .carved_ground import CarvedGround
+from .carved_ground import CarvedGround, Part
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
-from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
+from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
 
 COARSENESS = 0.7
 """Skin is looked at in cubes of so many cells: finer detail is lost in the ground."""
@@ -119,12 +119,12 @@ def carves_of(
             low, parts = carving.low(around), body.parts(number)
             for behind in body.behind(number):
                 carving.leave(behind)
-            for walls in dict.fromkeys(step.walls for step, _ in parts):
-                if (part := carving.drawn(parts, around, low, walls)) is not None:
-                    drawn.append(part)
-        for part in drawn:
+            for walls in dict.fromkeys(part.step.walls for part in parts):
+                if (passed := carving.drawn(parts, around, low, walls)) is not None:
+                    drawn.append(passed)
+        for passed in drawn:
             yield
-            carving.carve(part, drawn, frame)
+            carving.carve(passed, drawn, frame)
         carving.settle(drawn, frame)
     for step in steps.values():
         yield
@@ -164,22 +164,24 @@ class _Body:
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
-        for sole, triangles in skin.triangles.items():
+        every = list(skin.triangles.values())
+        outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
+        for (sole, triangles), sides in zip(skin.triangles.items(), outward, strict=True):
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             if taken:
-                self._parts.append((sole, taken, _nearest(taken, skin.frames), _coarse(triangles, places, size)))
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), *_coarse(triangles, sides, places, size)))
 
-    def parts(self, number: int) -> list[tuple[CarvedStep, Indices]]:
-        """The step that each part is nearest to at a frame, and the triangles of the part."""
-        return [(taken[nearest[number]], triangles) for _, taken, nearest, triangles in self._parts]
+    def parts(self, number: int) -> list[Part]:
+        """The step that each part is nearest to at a frame, with the part."""
+        return [Part(taken[nearest[number]], *skin) for _, taken, nearest, *skin in self._parts]
 
     def behind(self, number: int) -> list[CarvedStep]:
         """The steps that soles are not nearest to any more at a frame."""
         before = max(number - 1, 0)
         return [
             taken[nearest[before]]
-            for sole, taken, nearest, _ in self._parts
+            for sole, taken, nearest, *_ in self._parts
             if sole != NO_SOLE and nearest[before] != nearest[number]
         ]
 
@@ -192,15 +194,16 @@ def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:
     return nearest
 
 
-def _coarse(triangles: Indices, places: Array, size: float) -> Indices:
-    """Triangles (T, 3) between the lowest of the vertices (V, 3) in each cube of a size [m]."""
+def _coarse(triangles: Indices, sides: Array, places: Array, size: float) -> tuple[Indices, Array]:
+    """Triangles (T, 3) between the lowest of the vertices (V, 3) in each cube of a size [m], and their sides (T,)."""
     low = np.argsort(places[:, 2], kind="stable")
     first, cube = np.unique(np.floor(places[low] / size), axis=0, return_index=True, return_inverse=True)[1:]
     lowest = np.empty(len(places), dtype=np.intp)
     lowest[low] = low[first[cube]]
-    coarse = np.unique(lowest[triangles], axis=0)
+    coarse = lowest[triangles]
     a, b, c = coarse.T
-    return np.asarray(coarse[(a != b) & (b != c) & (c != a)])
+    kept = (a != b) & (b != c) & (c != a)
+    return coarse[kept], sides[kept]
 
 
 def _poses(skin: RespondedSkin) -> Iterator[Array]:
