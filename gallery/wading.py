@@ -20,7 +20,7 @@ CELL_SIZE = 0.005
 PRESET = "Fresh Fallen Snow"
 FRAMES, MOMENT = 80, 60
 START = 3.2  # m along y; the walk is toward -y
-PICTURE = (1600, 900)
+PICTURE = (1280, 720)
 FIRS = 150
 BOUNCES = 8
 """Of light, from one piece of snow to the next."""

@@ -21,7 +21,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import HIGHEST, REACH, SAMPLES, CarvedCells, Walls
+from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, Walls
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -72,8 +72,8 @@ class Drawn(NamedTuple):
         That its parts take.
     nearest : (rows, columns) int array
         The part that each cell is nearest to.
-    underside : (S, rows, columns) float array
-        Lowest surface over each cell at some places [m], infinite where there is none.
+    underside : (4, rows, columns) float array
+        Lowest surface over the quarters of each cell [m], infinite where there is none.
     way : (2,) float array
         Along x and y, of what moves most [m].
     """
@@ -178,7 +178,7 @@ class CarvedGround:
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low: Mask = (over < self._highest + HIGHEST).any(axis=0)  # what is laid in this frame heaps up
+        low: Mask = (over < self._highest + 2 * HIGHEST).any(axis=0)  # what is laid in this frame heaps up
         return low
 
     def drawn(self, parts: Sequence[Part], around: Array, low: Mask, walls: Walls) -> Drawn | None:
@@ -223,7 +223,7 @@ class CarvedGround:
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
         cut = cells.cut(np.maximum(body.underside, channels[2]), body.way, walls.packing, lowest, again=again)
         if round(frame) % self._slides_every == 0:
-            cells.slide(walls, lowest < cells.surface + self._cell_size, (window.row, window.column), SWEEPS)
+            cells.slide(walls, lowest < cells.surface + THICKEST, (window.row, window.column), SWEEPS)
         self._write(body.steps, window, cells, channels, frame, nearest=body.nearest, cut=cut)
 
     def leave(self, step: CarvedStep) -> None:
@@ -242,7 +242,7 @@ class CarvedGround:
             cells, channels = self._read(window)
             if not holds and frames == self._frames_to_rest:
                 cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
-            body = _lowest(bodies, window) < cells.surface + self._cell_size
+            body = _lowest(bodies, window) < cells.surface + THICKEST
             cells.slide(step.walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
             if holds and frames == 1:
                 cells.gather(channels[6] * QUANTUM, THIN)

@@ -1,8 +1,8 @@
 """Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
 
 Over the pressed ground T, every cell keeps the lowest undersides K that passed its quarters and the loose matter l on
-it: what stands is the mean of min(T, K), the surface lies l above that. So the outline of a hole is as smooth as shares
-of cells make it, whichever way it runs. A cut takes loose matter first. A part of it all is packed into the
+it: what stands is the middle of their min(T, K), the surface lies l above that. So the outline of a hole is as smooth as
+shares of cells make it, whichever way it runs. A cut takes loose matter first. A part of it all is packed into the
 wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
 
@@ -25,11 +25,12 @@ from ..pressing.repose import slid
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
-UNDER_SOLE = 0.01
-"""The same of a sole that presses, or a cell if that is less: within it the print is what the solver says, and the skin
-about that [m]; where the soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+UNDER_SOLE = 7e-3
+"""The same of a sole that presses, or a cell if that is less [m]: within it the print is what the solver says, and the
+skin about that, within a centimetre with what is not recorded yet; where the soft edge of a print stands out above the
+skin of the shoe, the shoe has cut it."""
 SAMPLES = 2
-"""Places along each side of a cell at which the lowest underside is known."""
+"""Quarters along each side of a cell."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
 THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
@@ -96,8 +97,8 @@ class CarvedCells:
         Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
     pressed : (rows, columns) float array
         Height of the pressed ground T, with its rims [m].
-    lowest : (S, rows, columns) float array
-        Lowest underside K so far at some places of each cell [m], infinite where none passed.
+    lowest : (4, rows, columns) float array
+        Lowest underside K so far in the quarters of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
         Height of the loose matter [m].
     cut_height, packed, unplaced : float
@@ -117,8 +118,8 @@ class CarvedCells:
 
     @property
     def standing(self) -> Array:
-        """Mean height of what stands, (rows, columns) [m]."""
-        return np.asarray(np.minimum(self.pressed, self.lowest).mean(axis=0))
+        """Height of what stands, (rows, columns) [m]: the middle of its quarters."""
+        return _middle(np.minimum(self.pressed, self.lowest))
 
     @property
     def surface(self) -> Array:
@@ -127,11 +128,11 @@ class CarvedCells:
 
     def press(self, pressed: Array) -> None:
         """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
-        before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
-        risen = np.maximum(after - before, 0.0).mean(axis=0)
-        self.cut_height += float(risen.sum())
-        self.loose += risen
+        before, raised = self.standing, pressed - self.pressed
         self.pressed = pressed
+        more = np.where(raised > 0, raised - (self.standing - before), 0.0)
+        self.cut_height += float(more.sum())
+        self.loose += more
 
     def cut(
         self, underside: Array, way: Array, packing: float, bodies: Array | None = None, *, again: float | None = None
@@ -140,8 +141,8 @@ class CarvedCells:
 
         Parameters
         ----------
-        underside : (S, rows, columns) float array
-            Lowest surface of the body over each place [m], infinite where there is none.
+        underside : (4, rows, columns) float array
+            Lowest surface of the body over each quarter of a cell [m], infinite where there is none.
         way : (2,) float array
             Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
         packing : float
@@ -161,10 +162,10 @@ class CarvedCells:
         depth = np.where(depth >= least, depth, 0.0)
         if not depth.any():
             return depth[0]
-        of_standing = np.maximum(depth - self.loose, 0.0)
-        self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
-        depth, of_standing = depth.mean(axis=0), of_standing.mean(axis=0)
-        of_loose = depth - of_standing
+        before, beyond = self.standing, depth > self.loose
+        self.lowest = np.where(beyond, standing - (depth - self.loose), self.lowest)
+        of_standing, of_loose = before - self.standing, _middle(np.minimum(depth, self.loose))
+        depth = of_standing + of_loose
         self.loose = np.maximum(self.loose - of_loose, 0.0)
         self.cut_height += float(of_standing.sum())
         thrown = (1.0 - packing) * of_standing + (1.0 - (packing if again is None else again)) * of_loose
@@ -176,10 +177,10 @@ class CarvedCells:
     def _lay(self, thrown: Array, way: Array, bodies: Array) -> None:
         """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
-        under_body = bodies - self.surface - TOLERANCE
+        highest = bodies - self.standing - TOLERANCE
         remaining = float(thrown.sum())
         for thickest in (THICKEST, HIGHEST, np.inf):
-            room = np.maximum(np.minimum(under_body, thickest - self.loose), 0.0)
+            room = np.maximum(np.minimum(highest, thickest) - self.loose, 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
                 if remaining <= ROUNDING or not (total := share.sum()):
@@ -237,6 +238,16 @@ class CarvedCells:
         self.cut_height -= float(loose[fallen].sum())
         self.lowest[:, fallen] = (np.minimum(self.pressed, self.lowest) + loose)[:, fallen]
         self.loose = np.maximum(loose, 0.0)
+
+
+def _middle(quarters: Array) -> Array:
+    """Mean of the two in the middle of four values (4, rows, columns).
+
+    A quarter that stands out alone does not count: no wall fills a slot that is hardly wider than a cell.
+    """
+    a, b, c, d = quarters
+    low, high = np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray((low + high) / 2)
 
 
 def _around(thrown: Array, way: Array, cell_size: float) -> Array:

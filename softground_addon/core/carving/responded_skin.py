@@ -20,7 +20,7 @@ from ..rig.rig_skin import RigSkin, carried, skinned
 from ..skin.volume import welded
 
 NO_SOLE = -1
-"""In place of the sole of skin that belongs to several, as a trunk does."""
+"""In place of the sole of skin that belongs to several, as a trunk does, or to none."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class RespondedSkin:
     jumps : tuple of int
         Samples at which the body is elsewhere than before, as at a cut.
     triangles : mapping of int to (T, 3) int array
-        By the number of the sole that they go with, or `NO_SOLE`; without what is carried.
+        By the number of the sole that they go with, or `NO_SOLE`, as of what is carried or dragged.
     """
 
     def __init__(self, worn: WornSkin, motion: CharacterMotion, response: Response) -> None:
@@ -90,9 +90,15 @@ class RespondedSkin:
         self.jumps = tuple(motion.starts[1:].tolist())
         recorded = vars(worn.recording)
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
-        body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)
-        sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[worn.skin.triangles[:, 0]]]
-        self.triangles = {int(number): worn.skin.triangles[body & (sole == number)] for number in np.unique(sole[body])}
+        triangles = worn.skin.triangles
+        sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[triangles[:, 0]]]
+        sole[carried(worn.skin, worn.bones)[triangles].any(axis=1)] = NO_SOLE
+        self.triangles = {int(number): triangles[sole == number] for number in np.unique(sole)}
+
+    @property
+    def parts(self) -> Indices:
+        """Number of the bone that each vertex moves with most, (V,)."""
+        return self._worn.skin.part
 
     def at(self, samples: Indices) -> Array:
         """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""

@@ -78,7 +78,10 @@ def _laid_by(carve: Footprint, x: Array, y: Array) -> Mask:
     laid = carve.tile(carve.rim) > 0
     column, row = (np.floor(place / carve.cell_size).astype(np.intp) for place in (x, y))
     holds = carve.window.holds(row, column)
-    return holds & laid[
-        np.clip(row - carve.window.row, 0, carve.window.rows - 1),
-        np.clip(column - carve.window.column, 0, carve.window.columns - 1),
-    ]
+    return (
+        holds
+        & laid[
+            np.clip(row - carve.window.row, 0, carve.window.rows - 1),
+            np.clip(column - carve.window.column, 0, carve.window.columns - 1),
+        ]
+    )

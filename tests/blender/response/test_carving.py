@@ -5,6 +5,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
@@ -145,8 +146,32 @@ def test_nor_of_who_runs_crawls_or_goes_on_four_legs(scene, skins, mover, snow):
     ]
     deepest = max(step.max_depth_m for step in left.footprints)
     print(f"\ndeepest {deepest:.3f} m, skin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
-    print(np.round(np.array(depths) * 1e3).tolist(), report["carved"])
+    assert report["carved"]
     assert max(depths) <= CELL
+
+
+def test_what_a_body_drags_carves_the_snow(scene):
+    armature = walker(scene, **DEEP)
+    scene.frame_set(1)
+    mesh = bpy.data.meshes.new("Sledge")
+    corners = np.array(np.meshgrid((-0.2, 0.2), (-0.2, 0.2), (0.0, 0.4))).reshape(3, -1).T
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh.from_pydata(corners.tolist(), [], faces)
+    sledge = bpy.data.objects.new("Sledge", mesh)
+    scene.collection.objects.link(sledge)
+    sledge.parent, sledge.parent_type, sledge.parent_bone = armature, "BONE", "spine"
+    bpy.context.view_layer.update()
+    behind = armature.matrix_world @ armature.pose.bones["hips"].matrix.translation
+    sledge.matrix_world = Matrix.Translation((behind.x + 0.6, behind.y, 0.2))  # aside, 10 cm deep as feet sink
+    bpy.context.view_layer.update()
+    _, left = bake(scene)
+    scene.frame_set(FRAMES // 2)
+    shown = sledge.matrix_world.translation
+    assert -0.25 < shown.z < -0.05
+    compression, rim = recompose(left.shaping, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    assert (rim - compression)[0] < shown.z + 0.02
+    without = recompose(left.edited, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    assert without[1][0] - without[0][0] > -0.01
 
 
 def test_between_two_holes_the_ground_is_5_cm_lower_than_the_snow(scene):
