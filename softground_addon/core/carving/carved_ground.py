@@ -53,7 +53,7 @@ class Part(NamedTuple):
     sides: Array
 
     def below(self, around: Array, low: Mask) -> Indices:
-        """Triangles (N, 3) that may touch the ground: low, and no upper side of the vertices (4, V, 3) around a frame."""
+        """Triangles (N, 3) that are low, and no upper sides, by the vertices (4, V, 3) around a frame."""
         near = np.logical_or.reduce([low[corners] for corners in self.triangles.T])
         triangles, sides = self.triangles[near], self.sides[near]
         is_above = sides != 0
@@ -203,8 +203,8 @@ class CarvedGround:
         first = np.cumsum([0, *(len(places) for places, _ in passed)])
         places = np.concatenate([places for places, _ in passed])
         triangles = np.concatenate([corners + start for (_, corners), start in zip(passed, first, strict=False)])
-        low_corner, high_corner = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
-        window = Window.around(low_corner, high_corner, self._cell_size).expanded(self._margin)
+        corners = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
+        window = Window.around(*corners, self._cell_size).expanded(self._margin)
         apart = self._cell_size / SAMPLES
         origin = np.array((window.column, window.row)) * self._cell_size + apart / 2
         shape = window.rows * SAMPLES, window.columns * SAMPLES
@@ -309,8 +309,10 @@ class CarvedGround:
         channels[3], channels[4], channels[7:] = cells.pressed, cells.loose, cells.lowest
         channels[5:7] += change
         self._cells.write(window, channels)
-        shares = np.ones(len(steps)) if cut is None else np.bincount(nearest.ravel(), cut.ravel(), len(steps))
-        shares = shares / shares.sum() if shares.any() else np.full(len(steps), 1.0 / len(steps))
+        shares = np.ones(len(steps))
+        if nearest is not None and cut is not None and cut.any():
+            shares = np.bincount(nearest.ravel(), cut.ravel(), len(steps))
+        shares = shares / shares.sum()
         for number, (step, share) in enumerate(zip(steps, shares.tolist(), strict=True)):
             step.at_rest = least == 1
             step.cut += share * cells.cut_height

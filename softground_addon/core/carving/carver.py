@@ -1,8 +1,8 @@
 """Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
 
 Over the pressed ground T, every cell keeps the lowest undersides K that passed its quarters and the loose matter l on
-it: what stands is the middle of their min(T, K), the surface lies l above that. So the outline of a hole is as smooth as
-shares of cells make it, whichever way it runs. A cut takes loose matter first. A part of it all is packed into the
+it: what stands is the middle of their min(T, K), the surface lies l above that. So the outline of a hole is smooth. A
+cut takes loose matter first. A part of it all is packed into the
 wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
 

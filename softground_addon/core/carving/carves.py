@@ -29,8 +29,6 @@ from .carved_step import CarvedStep, is_deep
 from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
 
-COARSENESS = 0.7
-"""The skin of each bone is looked at in cubes of so many cells: finer detail is lost in the ground."""
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 
@@ -108,8 +106,7 @@ def carves_of(
     }
     carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
-    size = COARSENESS * first.cell_size
-    bodies = [_Body(name, soles, skin, taken, size) for name, soles, skin in skins]
+    bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
@@ -159,23 +156,18 @@ def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
 class _Body:
     """A character's skin, part by part, and the steps that these parts take."""
 
-    def __init__(
-        self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep], size: float
-    ) -> None:
+    def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep]) -> None:
         self.poses = _poses(skin)
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
-        cubes = np.column_stack([np.floor(places / size), skin.parts])
         every = list(skin.triangles.values())
         outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
         for (sole, triangles), sides in zip(skin.triangles.items(), outward, strict=True):
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             if taken:
-                self._parts.append(
-                    (sole, taken, _nearest(taken, skin.frames), *_coarse(triangles, sides, places[:, 2], cubes))
-                )
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles, sides))
 
     def parts(self, number: int) -> list[Part]:
         """The step that each part is nearest to at a frame, with the part."""
@@ -197,18 +189,6 @@ def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:
     away = np.maximum(spans[:, :1] - frames, frames - spans[:, 1:]).clip(min=0.0)
     nearest: Indices = away.argmin(axis=0)
     return nearest
-
-
-def _coarse(triangles: Indices, sides: Array, heights: Array, cubes: Array) -> tuple[Indices, Array]:
-    """Triangles (T, 3) between the lowest of the vertices (V,) in each cube (V, 4), and their sides (T,)."""
-    low = np.argsort(heights, kind="stable")
-    first, cube = np.unique(cubes[low], axis=0, return_index=True, return_inverse=True)[1:]
-    lowest = np.empty(len(low), dtype=np.intp)
-    lowest[low] = low[first[cube]]
-    coarse = lowest[triangles]
-    a, b, c = coarse.T
-    kept = (a != b) & (b != c) & (c != a)
-    return coarse[kept], sides[kept]
 
 
 def _poses(skin: RespondedSkin) -> Iterator[Array]:

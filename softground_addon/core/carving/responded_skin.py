@@ -95,11 +95,6 @@ class RespondedSkin:
         sole[carried(worn.skin, worn.bones)[triangles].any(axis=1)] = NO_SOLE
         self.triangles = {int(number): triangles[sole == number] for number in np.unique(sole)}
 
-    @property
-    def parts(self) -> Indices:
-        """Number of the bone that each vertex moves with most, (V,)."""
-        return self._worn.skin.part
-
     def at(self, samples: Indices) -> Array:
         """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""
         count = len(self._worn.skin.vertices)

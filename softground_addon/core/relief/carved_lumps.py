@@ -65,11 +65,8 @@ def lumps(carve: Footprint, loose: HeightField, x: Array, y: Array, amounts: Amo
         return np.asarray(sum((size.heights(around) for size in sizes), nothing) * (thickness(x, y) > 0))
 
     of_cells = [place.ravel() for place in np.meshgrid(*carve.window.centres(carve.cell_size))]
-    volume = float(thickness(*of_cells).sum())
-    if not volume:
-        return np.zeros(len(x))
-    raised = float(heights(*of_cells).sum()) / volume
-    part = min(1.0, DEEPEST / raised) if raised > 0 else 0.0
+    raised = float(heights(*of_cells).sum()) / max(float(thickness(*of_cells).sum()), 1e-12)
+    part = min(1.0, DEEPEST / max(raised, 1e-12))
     return part * (heights(x, y) - raised * thickness(x, y))
 
 
