@@ -18,6 +18,8 @@ from sample_scenes.stage import Array
 
 CELL_SIZE = 0.005
 PRESET = "Settled Snow"
+FIRM = {"material.youngs_modulus": "300000"}
+"""In which a dog sinks to its elbows no more [Pa]."""
 BODY = Dog()
 FRAMES, MOMENT = 80, 66
 START = 2.4  # m along y; the dog goes toward -y
@@ -38,9 +40,9 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     """A snow field, and a dog across the picture."""
     ground = open_air.add_ground(scene, "Snow", (-6.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (2.1, -0.75, 0.62), (0.0, 0.1, 0.16), 38.0, (0.0, 0.0, 0.0), 11.0)
+    open_air.add_camera(scene, (2.5, -0.75, 0.72), (0.0, -0.12, 0.2), 38.0, (0.0, 0.0, 0.0), 11.0)
     motion = go_on_four_legs(BODY, WALK, FRAMES, scene.render.fps)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options, motion, BODY)
+    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, FIRM | dict(options or {}), motion, BODY)
     return DogInSnow({PRESET: bake})
 
 

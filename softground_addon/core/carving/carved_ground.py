@@ -203,8 +203,8 @@ class CarvedGround:
         first = np.cumsum([0, *(len(places) for places, _ in passed)])
         places = np.concatenate([places for places, _ in passed])
         triangles = np.concatenate([corners + start for (_, corners), start in zip(passed, first, strict=False)])
-        corners = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
-        window = Window.around(*corners, self._cell_size).expanded(self._margin)
+        low_corner, high_corner = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
+        window = Window.around(low_corner, high_corner, self._cell_size).expanded(self._margin)
         apart = self._cell_size / SAMPLES
         origin = np.array((window.column, window.row)) * self._cell_size + apart / 2
         shape = window.rows * SAMPLES, window.columns * SAMPLES
@@ -311,7 +311,7 @@ class CarvedGround:
         self._cells.write(window, channels)
         shares = np.ones(len(steps))
         if nearest is not None and cut is not None and cut.any():
-            shares = np.bincount(nearest.ravel(), cut.ravel(), len(steps))
+            shares = np.bincount(nearest.ravel(), cut.ravel(), len(steps)).astype(float)
         shares = shares / shares.sum()
         for number, (step, share) in enumerate(zip(steps, shares.tolist(), strict=True)):
             step.at_rest = least == 1
