@@ -178,7 +178,7 @@ class CarvedGround:
         box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
         terrain = self._undisturbed.heights(box)
         over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low: Mask = (over < self._highest + 2 * HIGHEST).any(axis=0)  # what is laid in this frame heaps up
+        low: Mask = (over < self._highest + HIGHEST).any(axis=0)  # what is laid in this frame heaps up
         return low
 
     def drawn(self, parts: Sequence[Part], around: Array, low: Mask, walls: Walls) -> Drawn | None:
