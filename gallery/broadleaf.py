@@ -10,7 +10,7 @@ import numpy as np
 from gallery import firs, litter
 from sample_scenes import stage, terrain
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Colour
+from softground_addon.blender.nodes.shader_graph import Colour
 
 _SHAPES, _CLUMPS, _LEAVES = 4, 34, 130
 """How many trees are unlike, clumps of a crown, leaves of a clump."""

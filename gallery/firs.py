@@ -11,7 +11,7 @@ import numpy as np
 
 from sample_scenes import stage, terrain
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Colour, Graph, Socket
+from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
 _SHAPES, _WHORLS, _BRANCHES, _TWIGS, _SIDES = 4, 21, 9, 12, 40
 """How many trees are unlike, whorls of each, branches of a whorl, pairs of twigs on a branch, sides of a trunk."""

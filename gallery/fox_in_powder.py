@@ -113,7 +113,7 @@ def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
     firs.add_firs(NEAR_FIRS[:, :2], NEAR_FIRS[:, 2], _height, firs.WINTRY, seed=9, snow=0.6)
     open_air.add_haze(scene.world, *AIR)
     figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
-    coat = next(number for number, one in enumerate(figure.material_slots) if "coat" in one.material.name.lower())
+    coat = next(number for number, slot in enumerate(figure.material_slots) if "coat" in slot.material.name.lower())
     fur.add_fur(figure, HAIRS, _lie, _coat, THICKNESS, coat)
     scene.view_settings.exposure = 0.35
     path = folder / "fox_in_powder.jpg"

@@ -9,7 +9,7 @@ import numpy as np
 
 from sample_scenes import stage
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 
 COLOUR = "coat"
 """Attribute of hairs and skin."""

@@ -6,7 +6,7 @@ pieces are strewn over the undisturbed ground, so that none jumps while it moves
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import pi
 from typing import Any
 
@@ -16,10 +16,10 @@ import numpy as np
 from sample_scenes import stage
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
-from softground_addon.blender.node_graph import NodeGraph
-from softground_addon.blender.node_modifiers import inputs_of, new_group
+from softground_addon.blender.nodes.node_graph import NodeGraph
+from softground_addon.blender.nodes.node_modifiers import GroupInput, inputs_of, new_group
+from softground_addon.blender.nodes.shader_graph import Colour, Graph
 from softground_addon.blender.playback.own_data import COMPRESSION, REST
-from softground_addon.blender.shader_graph import Colour, Graph
 
 GROUP = MARK = "SoftGround Litter"
 PRESSED = "softground_pressed"
@@ -27,21 +27,22 @@ PRESSED = "softground_pressed"
 TOUCHED, BURIED = 0.0005, 0.008
 """Compression of the ground from which on pieces move with it, and at which they are pressed in for good [m]."""
 
-INPUTS: Mapping[str, tuple[str, Any, str]] = {
-    "Ground": ("NodeSocketObject", None, "The mesh that shows the prints"),
-    "Pieces": ("NodeSocketCollection", None, "Objects of size 1 that lie on the ground, one picked for each place"),
-    "Density": ("NodeSocketFloat", 1.0, "Pieces per square metre"),
-    "Where": ("NodeSocketString", "", "Float attribute of the ground that multiplies the density"),
-    "Smallest": ("NodeSocketFloat", 0.01, "Size of the smallest piece [m]"),
-    "Largest": ("NodeSocketFloat", 0.05, "Size of the largest piece [m]"),
-    "Law": ("NodeSocketFloat", 1.8, "How much more small ones there are: N larger than s goes as s to minus this"),
-    "Lean": ("NodeSocketFloat", 0.3, "Largest angle from upright of a piece that no foot has pressed [rad]"),
-    "Bend": ("NodeSocketFloat", 0.0, "Angle from upright of a piece that a foot has pressed [rad]"),
-    "Depth": ("NodeSocketFloat", 0.0, "How deep pieces lie in the ground, in sizes"),
-    "Bury": ("NodeSocketFloat", 0.3, "How much deeper a foot may press them, in sizes"),
-    "Seed": ("NodeSocketInt", 0, "Another number strews them elsewhere"),
-}
-"""What the group asks for: kind of socket, value at first, meaning."""
+INPUTS = (
+    GroupInput("Ground", None, "The mesh that shows the prints", kind="Object"),
+    GroupInput(
+        "Pieces", None, "Objects of size 1 that lie on the ground, one picked for each place", kind="Collection"
+    ),
+    GroupInput("Density", 1.0, "Pieces per square metre"),
+    GroupInput("Where", "", "Float attribute of the ground that multiplies the density", kind="String"),
+    GroupInput("Smallest", 0.01, "Size of the smallest piece [m]"),
+    GroupInput("Largest", 0.05, "Size of the largest piece [m]"),
+    GroupInput("Law", 1.8, "How much more small ones there are: N larger than s goes as s to minus this"),
+    GroupInput("Lean", 0.3, "Largest angle from upright of a piece that no foot has pressed [rad]"),
+    GroupInput("Bend", 0.0, "Angle from upright of a piece that a foot has pressed [rad]"),
+    GroupInput("Depth", 0.0, "How deep pieces lie in the ground, in sizes"),
+    GroupInput("Bury", 0.3, "How much deeper a foot may press them, in sizes"),
+    GroupInput("Seed", 0, "Another number strews them elsewhere", kind="Int"),
+)
 
 
 def ensure_group() -> Any:
@@ -49,14 +50,7 @@ def ensure_group() -> Any:
     known = next((tree for tree in bpy.data.node_groups if tree.get(MARK)), None)
     if known is not None:
         return known
-    graph = NodeGraph(new_group(GROUP, MARK))
-    interface = graph.tree.interface
-    interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    for name, (kind, value, meaning) in INPUTS.items():
-        socket = interface.new_socket(name, in_out="INPUT", socket_type=kind)
-        socket.description = meaning
-        if value is not None:
-            socket.default_value = value
+    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
     chosen = graph.node("NodeGroupInput").outputs
     seed = chosen["Seed"]
 
@@ -79,7 +73,7 @@ def ensure_group() -> Any:
         (density, "Density"),
         (seed, "Seed"),
     ):
-        graph.link(source, next(one for one in strewn.inputs if one.name == name and one.enabled))
+        graph.link(source, next(each for each in strewn.inputs if each.name == name and each.enabled))
 
     pressed = graph.node("ShaderNodeMapRange", interpolation_type="SMOOTHSTEP")
     for source, index in ((graph.attribute(COMPRESSION), 0), (TOUCHED, 1), (BURIED, 2)):
@@ -116,16 +110,16 @@ def ensure_group() -> Any:
 def _random(graph: NodeGraph, seed: Any, number: int) -> Any:
     """A number from 0 to 1 for each piece."""
     node = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
-    graph.link(graph.math("ADD", seed, 100.0 * number), next(one for one in node.inputs if one.name == "Seed"))
-    return graph.number(next(one for one in node.outputs if one.enabled))
+    graph.link(graph.math("ADD", seed, 100.0 * number), next(each for each in node.inputs if each.name == "Seed"))
+    return graph.number(next(output for output in node.outputs if output.enabled))
 
 
 def _size(graph: NodeGraph, chosen: Any, seed: Any) -> Any:
     """Sizes by a power law between the smallest and the largest [m]."""
     smallest, law = graph.number(chosen["Smallest"]), graph.number(chosen["Law"])
     ratio = graph.number(graph.math("POWER", (smallest / graph.number(chosen["Largest"])).socket, law.socket))
-    left = 1.0 - _random(graph, seed, 5) * (1.0 - ratio)
-    return smallest * graph.number(graph.math("POWER", left.socket, graph.math("DIVIDE", -1.0, law.socket)))
+    still = 1.0 - _random(graph, seed, 5) * (1.0 - ratio)
+    return smallest * graph.number(graph.math("POWER", still.socket, graph.math("DIVIDE", -1.0, law.socket)))
 
 
 def strew(ground: bpy.types.Object, pieces: bpy.types.Collection, density: float | str, **values: Any) -> Any:
@@ -168,10 +162,10 @@ def material(name: str, dark: Colour, light: Colour, roughness: float, through: 
     made = stage.plain_material(f"SoftGround Sample {name}", light, roughness)
     graph = Graph(made.node_tree)
     shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    one = graph.out(graph.node("ShaderNodeObjectInfo"), 5)
+    seed = graph.out(graph.node("ShaderNodeObjectInfo"), 5)
     pressed = graph.out(graph.node("ShaderNodeAttribute", attribute_type="INSTANCER", attribute_name=PRESSED), 2)
     soiled = tuple(0.35 * part for part in dark)
-    colour = graph.mix(pressed * 0.85, graph.mix(one, dark, light), soiled)
+    colour = graph.mix(pressed * 0.85, graph.mix(seed, dark, light), soiled)
     made.node_tree.links.new(colour.output, shader.inputs["Base Color"])
     if through:
         shines = graph.node("ShaderNodeBsdfTranslucent", {0: colour})

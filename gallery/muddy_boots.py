@@ -15,7 +15,7 @@ from sample_scenes.body import Body
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.carried import marks_object
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""

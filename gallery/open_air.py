@@ -19,7 +19,7 @@ from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Colour, Graph, Socket
+from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
 NEAR, FAR = 9.0, 600.0
 """Half the width of the ground that is even, and of all of it [m]."""
@@ -179,7 +179,7 @@ def overgrow(material: bpy.types.Material, share: str, dark: Colour, light: Colo
     for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]:
         colour = shader.inputs["Base Color"]
         grown = graph.mix(cover, dark, graph.mix(tint, dark, light))
-        bare = next(one for one in grown.output.node.inputs if one.identifier == "A_Color")
+        bare = next(each for each in grown.output.node.inputs if each.identifier == "A_Color")
         tree.links.new(colour.links[0].from_socket, bare)
         tree.links.new(grown.output, colour)
     dull(graph, tree, graph.blend(cover, 1.0, 0.0))
@@ -258,11 +258,11 @@ def add_sea(scene: bpy.types.Scene, shore: Callable[[Array], Array], level: floa
         (corner[:, None] + [0, columns, columns + 1, 1]).tolist(),
     )
     mesh.shade_smooth()
-    there = np.clip(out / 0.12, 0.0, 1.0)
+    weight = np.clip(out / 0.12, 0.0, 1.0)
     fields = {
         "film": np.clip(1.0 + out / _FILM, 0.0, 1.0),
         "body": np.clip((out - 0.2) / 2.5, 0.0, 1.0),
-        "foam": there
+        "foam": weight
         * (
             np.exp(-out / 0.12)
             + 0.75 * np.exp(-(((out - 0.55) / 0.45) ** 2))

@@ -20,7 +20,7 @@ from sample_scenes.character import TO_BLENDER, assign_weights
 from sample_scenes.curves import clamped_spline
 from sample_scenes.shoe import outline_width, upper
 from sample_scenes.solids import Solid, cut, ellipsoid, mesh_of, round_cone, union
-from softground_addon.blender.shader_graph import Colour, Graph, Socket
+from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
 _LEATHER, _RUBBER, _LACE = (0.105, 0.050, 0.022), (0.014, 0.013, 0.012), (0.30, 0.045, 0.02)
 _CLOTH = (0.050, 0.058, 0.066)
@@ -175,8 +175,8 @@ def _eyelets(foot: Foot) -> tuple[Array, NDArray[np.intp]]:
         across = _on_upper(foot, rows, np.full(len(rows), 0.5 + side * (_LACE_REACH + 0.01)), 0.0) - middle
         ahead, across = (way / np.linalg.norm(way, axis=1, keepdims=True) for way in (ahead, across))
         rings += [
-            (at + 0.0036 * (np.cos(around)[:, None] * one + np.sin(around)[:, None] * other), 0.0013)
-            for at, one, other in zip(middle, ahead, across, strict=True)
+            (at + 0.0036 * (np.cos(around)[:, None] * each + np.sin(around)[:, None] * other), 0.0013)
+            for at, each, other in zip(middle, ahead, across, strict=True)
         ]
     return litter.tubes(rings, 6, taper=1.0)
 

@@ -33,7 +33,7 @@ class Relief:
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Relief:
     """One walk on ten grounds."""
     chosen = [{"relief": relief} | dict(options or {}) for relief in ("OFF", "CLOSE_UP")]
-    built = [four_grounds.build(scene, cell_size, one, GROUNDS, row) for row, one in enumerate(chosen)]
+    built = [four_grounds.build(scene, cell_size, each, GROUNDS, row) for row, each in enumerate(chosen)]
     return Relief(dict(zip(("Plain", "Close-Up"), built, strict=True)))
 
 

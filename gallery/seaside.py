@@ -8,8 +8,8 @@ import bpy
 
 from softground_addon.blender.materials.materials import ensure_material
 from softground_addon.blender.materials.surface_shaders import UP
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.blender.playback.own_data import COMPRESSION
-from softground_addon.blender.shader_graph import Graph
 
 HORIZON, HALFWAY, ZENITH = (0.96, 0.60, 0.40), (0.62, 0.62, 0.68), (0.15, 0.28, 0.52)
 """Colours of the sky: at the horizon, at 8 degrees and from 30 degrees on."""
@@ -35,9 +35,9 @@ def add_sky(scene: bpy.types.Scene, toward: float, elevation: float, strength: f
     far = graph.math("DIVIDE", 1.0, up + 0.06)  # on a flat layer overhead
     layer = graph.node("ShaderNodeCombineXYZ", {0: x * far, 1: y * far * 0.45})
     clouds = graph.noise(graph.out(layer), 1.6, 7.0, 0.58)
-    there = graph.ramp(clouds, 0.44, 0.66) * graph.ramp(up, 0.004, 0.06) * 0.85
+    cover = graph.ramp(clouds, 0.44, 0.66) * graph.ramp(up, 0.004, 0.06) * 0.85
     lit = graph.mix(graph.ramp(near, 0.4, 1.0), CLOUD, LIT_CLOUD)
-    colour = graph.mix(there, colour, lit)
+    colour = graph.mix(cover, colour, lit)
     colour = graph.mix(graph.math("POWER", near, 14.0) * 0.7, colour, GLOW)
     bright = graph.math("POWER", near, 60.0) * 2.0 + graph.math("POWER", near, 8.0) * 0.5 + 1.0
     background = graph.node("ShaderNodeBackground", {"Color": colour, "Strength": bright * strength})

@@ -141,12 +141,12 @@ def _set_in(modifier: Any, frame: int) -> None:
 
 def claims(built: TimeLapse) -> list[Claim]:
     """What the weather does to the hollow of a step, from the end of the walk to the last picture."""
-    kept = {preset: hollow_left(bake) for preset, bake in built.bakes.items()}
+    shares = {preset: hollow_left(bake) for preset, bake in built.bakes.items()}
     return [
-        Claim("Hollow left by a night of snow", kept["SNOWFALL"], 0.0, 0.7),
-        Claim("Hollow left by a thaw: trodden snow melts last and stands up", kept["THAW"], -3.0, 0.7),
-        Claim("Hollow left by ten minutes of wind", kept["WINDY_DUNES"], 0.0, 0.9),
-        Claim("Hollow left by a drying beach", kept["DRYING_BEACH"], 0.5, 1.01),
+        Claim("Hollow left by a night of snow", shares["SNOWFALL"], 0.0, 0.7),
+        Claim("Hollow left by a thaw: trodden snow melts last and stands up", shares["THAW"], -3.0, 0.7),
+        Claim("Hollow left by ten minutes of wind", shares["WINDY_DUNES"], 0.0, 0.9),
+        Claim("Hollow left by a drying beach", shares["DRYING_BEACH"], 0.5, 1.01),
     ]
 
 

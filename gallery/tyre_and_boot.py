@@ -19,10 +19,10 @@ from sample_scenes.rolling_things import roll_along
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.playback.own_data import RIM
 from softground_addon.blender.playback.weather_nodes import WATER
-from softground_addon.blender.shader_graph import Graph
 from softground_addon.blender.weather import ground_weather as weather
 
 CELL_SIZE = 0.006

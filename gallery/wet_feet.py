@@ -14,7 +14,7 @@ from sample_scenes import production, stage
 from sample_scenes.production import Bake, Claim, Options
 from softground_addon.blender import compat
 from softground_addon.blender.carried import marks_object
-from softground_addon.blender.node_modifiers import inputs_of
+from softground_addon.blender.nodes.node_modifiers import inputs_of
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""

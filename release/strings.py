@@ -88,7 +88,7 @@ def _in_tables() -> Iterator[str]:
     yield from (surface.label.lower() for surface in SURFACES.values())
     yield from (joint.partition("_")[0].capitalize() for joint in JOINTS)
     yield from (*UNITS, "metres", "another unit")
-    yield from (text for name, *_, tooltip in (*weather_inputs.INPUTS, *marks_nodes.INPUTS) for text in (name, tooltip))
+    yield from (text for each in (*weather_inputs.INPUTS, *marks_nodes.INPUTS) for text in (each.name, each.meaning))
 
 
 def _in_code() -> Iterator[str]:
@@ -155,13 +155,15 @@ def faults(language: str) -> dict[str, list[str]]:
     return {
         "missing": sorted(wanted - texts.keys()),
         "superfluous": sorted(texts.keys() - wanted),
-        "other names": sorted(text for text, own in texts.items() if names(text) != names(own)),
+        "other names": sorted(text for text, translated in texts.items() if names(text) != names(translated)),
     }
 
 
 if __name__ == "__main__":
     softground_addon.register()
-    found = [(language, what, text) for language in LANGUAGES for what, of in faults(language).items() for text in of]
-    sys.stdout.writelines(f"{language}: {what}: {text}\n" for language, what, text in found)
+    all_faults = [
+        (language, what, text) for language in LANGUAGES for what, of in faults(language).items() for text in of
+    ]
+    sys.stdout.writelines(f"{language}: {what}: {text}\n" for language, what, text in all_faults)
     softground_addon.unregister()
-    sys.exit(bool(found))
+    sys.exit(bool(all_faults))

@@ -72,9 +72,9 @@ class Carriage:
 
     def arm(self, body: Body, side: str, phase: Array, chest: Array) -> dict[str, Array]:
         """Rotations of an arm, which swings against the leg of its side."""
-        own = phase + (0.0 if SIDES[side] > 0 else 0.5)
-        swing = np.radians(self.arm_forward + self.arm_swing * np.cos(2 * pi * (own - 0.02)))
-        elbow = np.radians(self.elbow_bend * (1 - self.elbow_swing * np.cos(2 * pi * (own - 0.07))))
+        cycle = phase + (0.0 if SIDES[side] > 0 else 0.5)
+        swing = np.radians(self.arm_forward + self.arm_swing * np.cos(2 * pi * (cycle - 0.02)))
+        elbow = np.radians(self.elbow_bend * (1 - self.elbow_swing * np.cos(2 * pi * (cycle - 0.07))))
         return hang_arm(body, side, chest, -swing, elbow, np.full_like(phase, np.radians(self.arm_inward)))
 
     def _drop(self, phase: Array) -> Array:

@@ -114,14 +114,14 @@ def assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.nda
     """Write the weights (V, B), small ones dropped. Blender's call for it takes a hundred times longer than BMesh."""
     for bone in bones:
         skin.vertex_groups.new(name=bone)
-    kept = np.where(weights < 0.01, 0.0, weights)
-    kept /= kept.sum(axis=1, keepdims=True)
+    bound = np.where(weights < 0.01, 0.0, weights)
+    bound /= bound.sum(axis=1, keepdims=True)
     mesh = bmesh.new()
     mesh.from_mesh(skin.data)
     groups = mesh.verts.layers.deform.verify()
     vertices = list(mesh.verts)
-    rows, columns = kept.nonzero()
-    for row, column, weight in zip(rows.tolist(), columns.tolist(), kept[rows, columns].tolist(), strict=True):
+    rows, columns = bound.nonzero()
+    for row, column, weight in zip(rows.tolist(), columns.tolist(), bound[rows, columns].tolist(), strict=True):
         vertices[row][groups][column] = weight
     mesh.to_mesh(skin.data)
     mesh.free()

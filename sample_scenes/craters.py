@@ -44,8 +44,8 @@ class Craters:
 
     def crater(self, row: str, value: float) -> Footprint:
         """The print of one sphere."""
-        (found,) = self.bakes["craters"].of(self.spheres[row, value].name)
-        return found
+        (crater,) = self.bakes["craters"].of(self.spheres[row, value].name)
+        return crater
 
 
 def place(row: str, value: float) -> np.ndarray:

@@ -59,14 +59,14 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
 def claims(built: Crossing) -> list[Claim]:
     """A trodden place takes on only what exceeds it, and the order of walkers does not matter elsewhere."""
     bake = built.bakes["Snow"]
-    tracks = [one.footprints for one in built.alone]
+    tracks = [each.footprints for each in built.alone]
     trodden, deeper = _overlap(tracks, recompose(bake.footprints))
     forward, backward = recompose(bake.footprints), recompose(bake.footprints[::-1])
-    left = _volume(bake.of(built.walkers[1].name)) / _volume(tracks[1])
+    remaining = _volume(bake.of(built.walkers[1].name)) / _volume(tracks[1])
     return [
         Claim("Prints that tread on a print of the other walker", float(len(trodden)), 1, 8),
         Claim("Depth where both trod, over the deeper of their lone prints", deeper, 1.0, 1.15),
-        Claim("Volume of the second walker's track, over what it is alone", left, 0.8, 0.999),
+        Claim("Volume of the second walker's track, over what it is alone", remaining, 0.8, 0.999),
         Claim("Difference of the ground put together in either order [m]", _difference(forward, backward), 0, 0),
     ]
 
@@ -78,16 +78,16 @@ def _volume(track: Sequence[Footprint]) -> float:
 def _overlap(tracks: Sequence[Sequence[Footprint]], together: HeightField) -> tuple[list[Footprint], float]:
     """Prints of the second track on prints of the first, and the mean depth there over the deeper one's alone."""
     alone = [recompose(track) for track in tracks]
-    found, growth = [], []
+    depths, growth = [], []
     for step in tracks[1]:
         for other in tracks[0]:
             shared = _cells(step) & _cells(other) if step.window.intersects(other.window) else None
             if shared:
-                found.append(step)
+                depths.append(step)
                 places = (np.array(sorted(shared)).T + 0.5) * step.cell_size
                 deeper = np.maximum(*(ground.sample(*places)[0] for ground in alone))
                 growth.append(together.sample(*places)[0].sum() / deeper.sum())
-    return found, float(np.max(growth, initial=0.0))
+    return depths, float(np.max(growth, initial=0.0))
 
 
 def _cells(step: Footprint) -> set[tuple[int, int]]:

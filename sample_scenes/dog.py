@@ -93,7 +93,7 @@ class Dog:
         How many times thicker the tail is than a shepherd's, and longer; how many times longer the ears are, thicker
         the snout and larger the paws.
     toes_apart : bool
-        Whether pads and toes stand out below the paws, and print one by one.
+        True if pads and toes stand out below the paws, and print one by one.
     """
 
     withers: float = 0.66

@@ -195,12 +195,12 @@ class FootCourse:
 
     def _swing(self, fall: Footfall, following: Footfall) -> Swing:
         time = following.strike - fall.leave
-        here, there = ground_frame(fall), ground_frame(following)
+        here, following_frame = ground_frame(fall), ground_frame(following)
         leaving = self._rolling(self.roll.stance_phase(np.array((1 - _INSTANT, 1 - 1e-12)), fall)) @ here.T
-        landing = self._rolling(self.roll.stance_phase(np.array((0.0, _INSTANT)), following)) @ there.T
+        landing = self._rolling(self.roll.stance_phase(np.array((0.0, _INSTANT)), following)) @ following_frame.T
         leave_velocity = (leaving[1] - leaving[0]) / (_INSTANT * (fall.leave - fall.strike))
         land_velocity = (landing[1] - landing[0]) / (_INSTANT * (following.leave - following.strike))
-        land_velocity = land_velocity + there @ self.touch_down
+        land_velocity = land_velocity + following_frame @ self.touch_down
         return Swing(
             fall,
             following,

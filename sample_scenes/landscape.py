@@ -23,7 +23,7 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.run import Run, run
 from sample_scenes.snowshoe import ON_SNOWSHOES, put_on_snowshoes
 from softground_addon.blender.materials import materials
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.record.footprints import Footprint
 

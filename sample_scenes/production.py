@@ -58,7 +58,7 @@ class Claim:
 
     @property
     def holds(self) -> bool:
-        """Whether the number is in its range."""
+        """True if the number is in its range."""
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:
@@ -172,8 +172,8 @@ def bake(
         for sole in shot.characters[-1].soles:
             if shoe := walker.shoes.get(sole.side[:1]):
                 sole.object = shoe
-        found = {sole.bone for sole in shot.characters[-1].soles}
-        if more := [bone for bone in walker.more if bone not in found]:
+        bones = {sole.bone for sole in shot.characters[-1].soles}
+        if more := [bone for bone in walker.more if bone not in bones]:
             contact_editing.add_bone_contacts(shot.characters[-1], more)
         if walker.held:
             contact_editing.add_object_contacts(scene.softground, shot.characters[-1], walker.held)

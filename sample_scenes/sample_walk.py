@@ -49,7 +49,10 @@ def as_data() -> dict:
             [bone.name, bone.parent.name if bone.parent else "", _rounded(bone.head_local), _rounded(bone.tail_local)]
             for bone in armature.data.bones
         ],
-        "materials": [[one.name, _rounded(one.diffuse_color), round(one.roughness, 3)] for one in mesh.materials],
+        "materials": [
+            [material.name, _rounded(material.diffuse_color), round(material.roughness, 3)]
+            for material in mesh.materials
+        ],
         "vertices": [_rounded(vertex.co) for vertex in mesh.vertices],
         "carried_by": [names[max(v.groups, key=lambda group: group.weight).group] for v in mesh.vertices],
         "faces": [list(face.vertices) for face in mesh.polygons],

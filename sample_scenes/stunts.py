@@ -93,7 +93,7 @@ def claims(built: Stunts) -> list[Claim]:
 
 
 def _in_order(steps: dict[str, tuple[Footprint, ...]]) -> bool:
-    """Whether the prints that begin after the start are those of a cartwheel to the left."""
+    """True if the prints that begin after the start are those of a cartwheel to the left."""
     later = sorted((step for step in steps["cartwheel"] if step.start_frame > 4), key=lambda step: step.start_frame)
     return [step.sole for step in later] == ["foot.L", "hand.L", "hand.R", "foot.R", "foot.L"]
 

@@ -42,7 +42,7 @@ class Ground:
     terrain : float or Terrain
         Height of a level ground [m], or anything whose `heights(x, y)` gives heights [m].
     pressure : 'CENTRE_OF_PRESSURE' or 'UNIFORM'
-        Whether a sole presses most where its force acts, or evenly.
+        True if a sole presses most where its force acts, or evenly.
     """
 
     material: GroundMaterial

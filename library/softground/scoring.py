@@ -71,7 +71,7 @@ def plates_saw_everything(measured: Array, touching: Mask, *, weight: float, rat
     measured : (F, 2) float array
         Vertical plate forces [N].
     touching : (F, 2) bool array
-        Whether heights and speeds show the foot on the ground; no force has a part in that.
+        True if heights and speeds show the foot on the ground; no force has a part in that.
     weight : float
         Body weight [N].
     rate : float

@@ -46,7 +46,7 @@ def as_preset(options: Any, name: str, source: str = "") -> Preset:
 
 
 def holds(options: Any, preset: Preset) -> bool:
-    """Return whether the scene's ground is as a preset says, or will be with its first character."""
+    """True if the scene's ground is as a preset says, or will be with its first character."""
     for group, field, value in _of_preset(options, preset):
         if not options.characters and not group.is_property_set(field):
             continue

@@ -18,7 +18,7 @@ from .live import live
 from .operators import modal_job
 from .panels.outdated import compare_bake
 from .reading import analysis
-from .sampling.temporary import IS_TEMPORARY
+from .sampling.sampling_scene import IS_TEMPORARY
 from .viewport import overlay
 from .weather import weather_keys
 

@@ -26,10 +26,23 @@ def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     return values.reshape(-1, 3)
 
 
-def add_attributes(mesh: bpy.types.Mesh, columns: Iterable[tuple[str, Any, NDArray[Any]]]) -> None:
-    """Give the vertices attributes, each by its name, data type and values (V,) or (V, 3)."""
+Column = tuple[str, Any, NDArray[Any]]
+"""Name, data type and values (V,) or (V, 3) of an attribute of points."""
+
+
+def points(name: str, place: NDArray[np.floating], columns: Iterable[Column]) -> bpy.types.Mesh:
+    """A mesh of vertices alone, at places (V, 3) [Blender units]."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(place))
+    mesh.vertices.foreach_set("co", place.astype(np.float32).ravel())
+    add_attributes(mesh, columns)
+    return mesh
+
+
+def add_attributes(geometry: bpy.types.Mesh | bpy.types.Curves, columns: Iterable[Column]) -> None:
+    """Give the points of a geometry attributes."""
     for name, kind, values in columns:
-        attribute: Any = mesh.attributes.new(name, kind, "POINT")
+        attribute: Any = geometry.attributes.new(name, kind, "POINT")
         flat = values.astype(np.int32 if kind.startswith("INT") else np.float32).ravel()
         attribute.data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
 
@@ -154,7 +167,7 @@ def triangle_corners(faces: Faces) -> Slices[Indices]:
 
 
 def _has_outer_diagonal(*corners: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return whether the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
+    """True if the diagonal from the first of a quad's corners (N, 3) has the two others on one side."""
     first, diagonal, last = (corner - corners[0] for corner in corners[1:])
 
     def dot(a: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -37,7 +37,7 @@ class OnShot:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is any character in the scene."""
+        """True if there is any character in the scene."""
         cast("Any", cls).poll_message_set(translated("Add a character first"))
         return bool(character_setup.characters_of(settings.options_of(context)))
 
@@ -47,7 +47,7 @@ class OnBake:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a bake on the scene's ground."""
+        """True if there is a bake on the scene's ground."""
         ground = settings.options_of(context).ground
         cast("Any", cls).poll_message_set(translated("Bake the footprints first"))
         return ground is not None and baked_ground.is_baked(ground)

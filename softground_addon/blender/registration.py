@@ -66,6 +66,7 @@ CLASSES = (
     *live_footprints.CLASSES,
     *overlay.CLASSES,
     *preset_menu.CLASSES,
+    *prediction.CLASSES,
     *force_curves.CLASSES,
     *event_points.CLASSES,
     *make_sound.CLASSES,

@@ -133,7 +133,7 @@ def show_preview(is_shown: bool) -> None:
 
 
 def is_previewing() -> bool:
-    """Return whether the ground shows for a moment what it does not hold, as while a step is dragged."""
+    """True if the ground shows for a moment what it does not hold, as while a step is dragged."""
     return state.is_previewing
 
 
@@ -150,7 +150,7 @@ def chosen_steps() -> tuple[str, ...]:
 
 
 def is_rendering() -> bool:
-    """Return whether Blender renders beside what its user does."""
+    """True if Blender renders beside what its user does."""
     return bool(bpy.app.is_job_running("RENDER"))
 
 

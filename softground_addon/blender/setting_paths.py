@@ -17,7 +17,7 @@ _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\
 
 
 def check_stored(group: Any) -> None:
-    """Return whether all values of a group of settings are such as its fields take: those of a forged file may be any.
+    """True if all values of a group of settings are such as its fields take: those of a forged file may be any.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def options_of(context: bpy.types.Context) -> Any:
 
 
 def exists(obj: bpy.types.Object | None) -> bool:
-    """Return whether an object of the settings is there: those deleted in the viewport live on in the settings only."""
+    """True if an object of the settings is there: those deleted in the viewport live on in the settings only."""
     if obj is None:
         return False
     users, linked = state.existing.get(obj.session_uid, (-1, False))
@@ -208,12 +208,12 @@ def _calm(options: Any, units: SceneUnits) -> FeltWeather:
 
 
 def is_prop(character: Any) -> bool:
-    """Return whether an entry of the characters is of objects without a rig."""
+    """True if an entry of the characters is of objects without a rig."""
     return not (character.armature or character.body) and any(sole.object for sole in character.soles)
 
 
 def is_set_up(character: Any) -> bool:
-    """Return whether an entry of the characters still has what leaves prints: an armature, a body or an object."""
+    """True if an entry of the characters still has what leaves prints: an armature, a body or an object."""
     owner = character.armature or character.body
     return exists(owner) if owner else is_prop(character)
 

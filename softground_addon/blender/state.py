@@ -39,6 +39,8 @@ class State:
         Depth that was typed in each scene.
     predicting : list of jobs
         Depths that are being worked out.
+    refining : list of jobs
+        Depths that are being worked out from all contacts.
     seen : dict
         Settings and prediction that the panel or overlay that asked first found in each scene; the others are drawn in
         the same turn, in which nothing changes any more.
@@ -86,6 +88,7 @@ class State:
     shown_depths: dict[int, float] = field(default_factory=dict)
     aims: dict[int, Any] = field(default_factory=dict)
     predicting: list[Any] = field(default_factory=list)
+    refining: list[Any] = field(default_factory=list)
     seen: dict[int, Any] = field(default_factory=dict)
     compared: dict[int, Any] = field(default_factory=dict)
     outlines: WeakKeyDictionary[Any, Any] = field(default_factory=WeakKeyDictionary)

@@ -31,7 +31,7 @@ def map_of(image: bpy.types.Image | None) -> str:
 
 
 def check(image: bpy.types.Image | None) -> None:
-    """Return whether the pattern of soles can be taken from an image.
+    """True if the pattern of soles can be taken from an image.
 
     Raises
     ------

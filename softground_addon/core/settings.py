@@ -144,11 +144,11 @@ class BakeSettings(SceneUnits):
     frames : (int, int)
         First and last of the scene.
     sink_feet : bool
-        Whether feet are let down where a rig can take it, and are left as they are where not.
+        True if feet are let down where a rig can take it, and are left as they are where not.
     output : 'BOTH', 'PRINTS' or 'RESPONSE'
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
     shape_keys, dense_shape_keys : bool
-        Whether they are kept, and also where the ground is dense.
+        True if they are kept, and also where the ground is dense.
     tread_pattern : str
         One of `relief.tread.PATTERNS`, 'IMAGE' or 'SHOES'.
     tread_image : str
@@ -165,7 +165,7 @@ class BakeSettings(SceneUnits):
     longest_bake_s : float
         A bake that would take longer is refused.
     debris : bool
-        Whether steps throw what physics says, which is then missing from their rims.
+        True if steps throw what physics says, which is then missing from their rims.
     shoe_treads : tuple of (str, str, str)
         Character, name of a sole, and its `relief.tread_map` as text, as a bake has read them from its meshes.
     weather : FeltWeather or None
@@ -177,15 +177,15 @@ class BakeSettings(SceneUnits):
     wet_grounds : tuple of str
         What wets each of the `hard_grounds`, empty of a dry one; none if all are dry.
     marks : bool
-        Whether soles leave on hard ground what sticks to them.
+        True if soles leave on hard ground what sticks to them.
     carve : bool
-        Whether bodies carve deep ground where their feet are let down.
+        True if bodies carve deep ground where their feet are let down.
     regions : tuple of RegionSettings
         Slots of the ground that are made of something else, or are hard.
     gravity_direction : (float, float, float)
         Unit vector in the world.
     under : 'AUTO', 'ALWAYS' or 'NEVER'
-        Whether prints show what lies below the layer; by default where that is thin.
+        True if prints show what lies below the layer; by default where that is thin.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))

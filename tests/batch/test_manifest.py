@@ -254,10 +254,10 @@ def test_a_pattern_that_goes_through_a_whole_disk_is_refused(tmp_path, monkeypat
     for pattern in ("**/*.blend", "deep/*.blend", "**/**/**/**/*.blend", str(tmp_path / "**/x.blend")):
         with pytest.raises(InputError, match="goes through more than 50 files: name the folder"):
             manifest.parse(json.dumps({"shots": [{"files": pattern, "in_place": True}]}), tmp_path, "it", is_json=True)
-    (found,) = manifest.parse(
+    (shot,) = manifest.parse(
         json.dumps({"shots": [{"files": "*.blend", "in_place": True}]}), tmp_path, "it", is_json=True
     )
-    assert found.file == tmp_path / "a.blend"
+    assert shot.file == tmp_path / "a.blend"
 
 
 def test_a_pattern_finds_what_a_shell_finds(tmp_path):

@@ -151,9 +151,9 @@ def test_workers_compute_in_one_thread_unless_the_user_has_said_otherwise(batch,
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     if wanted:
         monkeypatch.setenv("OPENBLAS_NUM_THREADS", wanted)
-    told = batch.folder / "threads"
-    batch.run(batch.shot("a", f"open({str(told)!r}, 'w').write(os.environ['OPENBLAS_NUM_THREADS'])"), jobs=1)
-    assert told.read_text() == (wanted or "1")
+    threads = batch.folder / "threads"
+    batch.run(batch.shot("a", f"open({str(threads)!r}, 'w').write(os.environ['OPENBLAS_NUM_THREADS'])"), jobs=1)
+    assert threads.read_text() == (wanted or "1")
 
 
 def test_a_crash_after_the_work_was_done_is_done(batch, monkeypatch):
@@ -298,11 +298,11 @@ def test_the_log_begins_with_the_command_line_as_the_systems_own_shell_takes_it(
 def test_what_a_killed_worker_left_behind_is_removed(batch):
     shot = batch.shot("a")
     (batch.folder / "baked").mkdir()
-    left, foreign = (being_written(batch.folder / "baked" / name) for name in ("a.blend", "a.v2.blend"))
-    left.touch()
+    partial, foreign = (being_written(batch.folder / "baked" / name) for name in ("a.blend", "a.v2.blend"))
+    partial.touch()
     foreign.touch()
     batch.run(shot)
-    assert not left.exists()
+    assert not partial.exists()
     assert foreign.exists()
 
 

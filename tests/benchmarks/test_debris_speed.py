@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, node_modifiers
+from softground_addon.blender import compat
 from softground_addon.blender.debris import debris_object
+from softground_addon.blender.nodes import node_modifiers
 from softground_addon.core.debris.debris import Debris
 from softground_addon.core.rig.recording import SceneUnits
 from tests.benchmarks.test_playback_speed import heavy_walker

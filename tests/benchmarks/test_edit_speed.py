@@ -45,8 +45,8 @@ def test_a_step_of_the_demo_walk_follows_its_edit(scene, preset):
 def test_one_step_of_a_thousand_costs_no_more_than_one_of_fifty():
     edit, cost = StepEdit(move_m=(0.1, 0.0), turn_deg=5.0), {}
     for count in (50, 1000):
-        _, left = baked(steps=count)
-        print(f"\none step of {len(left.footprints)}: ", end="")
-        cost[count] = median_cost(EditedSteps(left.footprints, ground_of(), CELL), [(n, edit) for n in range(20, 40)])
+        _, record = baked(steps=count)
+        print(f"\none step of {len(record.footprints)}: ", end="")
+        cost[count] = median_cost(EditedSteps(record.footprints, ground_of(), CELL), [(n, edit) for n in range(20, 40)])
     assert cost[1000] < OF_A_THOUSAND
     assert cost[1000] < 1.25 * cost[50]

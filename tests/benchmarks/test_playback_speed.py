@@ -215,18 +215,18 @@ def test_detail_along_the_trail_plays_near_the_bare_frame_whatever_the_size_of_t
 def detail_costs(scene, size):
     """Costs of a walk on a plane of some size, in turns: bare, and baked with all that is on by default or without."""
     ground = grid(scene, 2, size, f"Plane {size:.0f}")
-    kept = {}
+    sizes = {}
     for shape_keys in (True, False):
         display_mesh, report = bake(scene, ground, detail="AUTO", shape_keys=shape_keys)
-        kept[shape_keys] = display_mesh.copy()
-        del kept[shape_keys][trail_detail.DETAIL_OF]  # so that it stays when the bake is cleared
+        sizes[shape_keys] = display_mesh.copy()
+        del sizes[shape_keys][trail_detail.DETAIL_OF]  # so that it stays when the bake is cleared
         bpy.ops.softground.clear_bake()
-        scene.collection.objects.link(kept[shape_keys])
+        scene.collection.objects.link(sizes[shape_keys])
     bpy.data.objects.remove(ground)
-    print(f"\n{report['totals']['steps']} steps, {len(kept[True].data.vertices):,} vertices")
+    print(f"\n{report['totals']['steps']} steps, {len(sizes[True].data.vertices):,} vertices")
 
     def play(shown, shading):
-        for display_mesh in kept.values():
+        for display_mesh in sizes.values():
             display_mesh.hide_viewport = display_mesh != shown
         bpy.context.view_layer.update()
         if shown is not None:
@@ -236,12 +236,12 @@ def detail_costs(scene, size):
     rows = in_turns(
         {
             "bare": lambda: play(None, False),
-            "detail": lambda: play(kept[False], False),
-            "detail, shading": lambda: play(kept[False], True),
-            "detail, shading, shape keys": lambda: play(kept[True], True),
+            "detail": lambda: play(sizes[False], False),
+            "detail, shading": lambda: play(sizes[False], True),
+            "detail, shading, shape keys": lambda: play(sizes[True], True),
         }
     )
-    for display_mesh in kept.values():
+    for display_mesh in sizes.values():
         mesh = display_mesh.data
         bpy.data.objects.remove(display_mesh)
         bpy.data.meshes.remove(mesh)

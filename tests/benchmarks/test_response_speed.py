@@ -64,7 +64,10 @@ def test_the_rig_with_its_layer_plays_at_most_a_tenth_slower(scene, tmp_path):
     responders.bake(scene, output="RESPONSE")
     assert has_layer(armature)
     constraints = [
-        one for bone in armature.pose.bones for one in bone.constraints if one.name == LayerKind.RESPONSE.value
+        constraint
+        for bone in armature.pose.bones
+        for constraint in bone.constraints
+        if constraint.name == LayerKind.RESPONSE.value
     ]
 
     def frame_time():

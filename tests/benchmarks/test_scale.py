@@ -54,8 +54,8 @@ def many_steps(radius=ON_NEW_GROUND):
 
 def memory_per_step(radius):
     """By how much the largest memory of a bake grows with each further step [bytes]."""
-    few, many = few_steps(radius), many_steps(radius)
-    return (many["memory"] - few["memory"]) / (many["steps"] - few["steps"])
+    few, large = few_steps(radius), many_steps(radius)
+    return (large["memory"] - few["memory"]) / (large["steps"] - few["steps"])
 
 
 def test_the_size_of_the_ground_does_not_change_the_time_of_a_bake():
@@ -70,15 +70,15 @@ def test_the_size_of_the_ground_does_not_change_the_memory_of_a_bake():
 
 
 def test_each_of_a_thousand_steps_takes_the_time_of_one_of_fifty():
-    few, many = few_steps(), many_steps()
-    assert many["steps"] > 950
-    assert many["seconds"] / many["steps"] < 1.2 * few["seconds"] / few["steps"]
+    few, large = few_steps(), many_steps()
+    assert large["steps"] > 950
+    assert large["seconds"] / large["steps"] < 1.2 * few["seconds"] / few["steps"]
 
 
 def test_the_record_and_the_file_grow_by_little_with_each_step():
-    many = many_steps()
-    assert many["record"] / many["steps"] < 40e3
-    assert many["blend"] / many["steps"] < 150e3
+    large = many_steps()
+    assert large["record"] / large["steps"] < 40e3
+    assert large["blend"] / large["steps"] < 150e3
 
 
 def test_memory_grows_by_little_with_each_step_on_new_ground():

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from softground_addon.blender.materials import surface_shaders
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.nodes.shader_graph import Graph
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.surfaces import SURFACES
 
@@ -55,7 +55,7 @@ def bake(folder: Path) -> dict[str, object]:
     return {
         "label": scene.softground.material.bl_rna.properties["surface"].enum_items[RECORD.name].name,
         "material": display_mesh.material_slots[0].material.name,
-        "pieces": [list(one.diffuse_color) for one in bpy.data.materials if "Pieces" in one.name],
+        "pieces": [list(material.diffuse_color) for material in bpy.data.materials if "Pieces" in material.name],
         "debris": len(debris.data.vertices),
         "thrown_m3": sum(sum(step.thrown.values()) for step in baked_ground.record_of(ground).steps if step.footprint),
         "modifiers": [modifier.name for modifier in display_mesh.modifiers],

@@ -234,12 +234,12 @@ def gaps_on_the_rig(scene, result, terrain, character=None):
             if step["contact"] == sole.sole.name and step["character"] == armature.name:
                 during = (frames >= step["frame_start"]) & (frames <= step["frame_end"] - 0.5)  # then it is leaving
                 touching[:, index] |= during
-    found = []
+    measured = []
     for index, stands in enumerate(leaving_early(motion, touching, result.footprints).T):
         sole, carry = motion.soles[index], now[:, index] @ np.linalg.inv(before[:, index])
         carried = SoleMotion(sole.sole, carry[:, None] @ sole.transforms)
-        found.append(lowest_clearance(posed_points(carried)[stands], history, motion.frames[stands]))
-    return np.concatenate(found)
+        measured.append(lowest_clearance(posed_points(carried)[stands], history, motion.frames[stands]))
+    return np.concatenate(measured)
 
 
 def legs(scene, character=None):
@@ -248,12 +248,12 @@ def legs(scene, character=None):
     joints = dict(mapping_of(character).joints)
     frames = range(scene.softground.frame_start, scene.softground.frame_end + 1)
     motion = source_motion(scene, character)
-    found = []
+    measured = []
     for side, sole in leg_soles(motion).items():
         bones = [joints[f"{joint}_{side}"][0] for joint in ("hip", "knee", "ankle")]
         hip, knee, ankle = np.moveaxis(world_matrices(scene, character.armature, bones, frames)[..., :3, 3], 1, 0)
-        found.append(Leg(hip, knee, ankle, motion.soles[sole].transforms[:, 0, :3, 0]))
-    return found
+        measured.append(Leg(hip, knee, ankle, motion.soles[sole].transforms[:, 0, :3, 0]))
+    return measured
 
 
 def knee_turn(legs, rate):

@@ -54,24 +54,24 @@ def make(blend: str, heights: str) -> None:
         softground_addon.unregister()
 
 
-def edit(blend: str, saved: str, told: str) -> None:
+def edit(blend: str, saved: str, facts: str) -> None:
     """Mute a step of a shot, move and turn another, and save it; write its edits, and its records before and after."""
     from softground_addon.core.record.edits import StepEdit, step_id
 
     with _editable(blend) as (scene, bake, change):
-        one, other = (step_id(step) for step in bake.record.footprints[1:3])
+        first, other = (step_id(step) for step in bake.record.footprints[1:3])
         before = _stored(scene)
-        change({one: StepEdit(mute=True), other: StepEdit(move_m=(0.05, 0.02), turn_deg=7.0)})
+        change({first: StepEdit(mute=True), other: StepEdit(move_m=(0.05, 0.02), turn_deg=7.0)})
         bpy.ops.wm.save_as_mainfile(filepath=saved)
-        Path(told).write_bytes(pickle.dumps((_edits(scene), before, _stored(scene))))
+        Path(facts).write_bytes(pickle.dumps((_edits(scene), before, _stored(scene))))
 
 
-def reset(blend: str, told: str) -> None:
+def reset(blend: str, facts: str) -> None:
     """Write the edits of a shot as they are read here, and its records once they are reset, and before."""
     with _editable(blend) as (scene, _, change):
-        found, after = _edits(scene), _stored(scene)
+        before, after = _edits(scene), _stored(scene)
         change({})
-        Path(told).write_bytes(pickle.dumps((found, _stored(scene), after)))
+        Path(facts).write_bytes(pickle.dumps((before, _stored(scene), after)))
 
 
 @contextmanager

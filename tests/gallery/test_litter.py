@@ -33,8 +33,8 @@ def strewn(litter, compression):
     ground.data.attributes["position"].data.foreach_set("vector", pressed.ravel())
     litter.strew(ground, litter.twigs((0.1, 0.1, 0.1), (0.2, 0.2, 0.2)), "pieces", **VALUES)
     graph = bpy.context.evaluated_depsgraph_get()
-    found = [np.array(one.matrix_world) for one in graph.object_instances if one.is_instance]
-    return np.array(found)
+    matrices = [np.array(instance.matrix_world) for instance in graph.object_instances if instance.is_instance]
+    return np.array(matrices)
 
 
 def leans(matrices):
@@ -79,7 +79,9 @@ def test_sizes_keep_within_their_bounds_and_small_ones_are_more(litter):
     pieces = litter.stones((0.1, 0.1, 0.1), (0.2, 0.2, 0.2))
     litter.strew(ground, pieces, 4000.0, smallest=0.01, largest=0.08, law=2.0)
     graph = bpy.context.evaluated_depsgraph_get()
-    sizes = np.array([one.matrix_world.to_scale().x for one in graph.object_instances if one.is_instance])
+    sizes = np.array(
+        [instance.matrix_world.to_scale().x for instance in graph.object_instances if instance.is_instance]
+    )
     assert sizes.min() >= 0.01 - 1e-6
     assert sizes.max() <= 0.08 + 1e-6
     share = (sizes > 0.02).mean()

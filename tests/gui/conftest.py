@@ -89,7 +89,7 @@ def installed(suite: str) -> str:
 
 
 @cache
-def told(suite: str, story: str) -> dict:
+def facts_of(suite: str, story: str) -> dict:
     """What a story noted down; told once."""
     installed(suite)
     folder = OUTPUT / suite / story
@@ -101,10 +101,10 @@ def told(suite: str, story: str) -> dict:
     printed = blender(suite, "gui", *window, *arguments, seconds=STORY_SECONDS)
     (folder / "printed.txt").write_text(printed, encoding="utf-8")
     facts = folder / "facts.json"
-    found = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {}
-    if not found.keys() & {"finished", "error"}:
-        found["error"] = f"Blender ended before the story, which knew {found}"
-    return {**found, "printed": printed}
+    noted = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {}
+    if not noted.keys() & {"finished", "error"}:
+        noted["error"] = f"Blender ended before the story, which knew {noted}"
+    return {**noted, "printed": printed}
 
 
 @pytest.fixture(scope="session", params=SUITES)
@@ -123,8 +123,8 @@ def suite(request):
 @pytest.fixture(scope="session")
 def tell(suite):
     def facts(story: str) -> dict:
-        found = told(suite, story)
-        assert "error" not in found, f"{found['error']}\n{found['printed'][-2000:]}"
-        return found
+        noted = facts_of(suite, story)
+        assert "error" not in noted, f"{noted['error']}\n{noted['printed'][-2000:]}"
+        return noted
 
     return facts

@@ -31,7 +31,7 @@ ROW = 11
 
 def module(name: str) -> Any:
     """A module of the add-on's Blender side, whatever Blender has named its package."""
-    return next(one for key, one in sys.modules.items() if key.endswith(f"softground_addon.blender.{name}"))
+    return next(item for key, item in sys.modules.items() if key.endswith(f"softground_addon.blender.{name}"))
 
 
 class Hand:

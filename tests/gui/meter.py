@@ -39,12 +39,12 @@ class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
 
 def longest_pauses(*, during_bake: bool, count: int = 8) -> list[tuple[float, float]]:
     """The longest pauses between two events [s] and how far the bake was, the one in which it ends among them."""
-    found = [
+    areas = [
         (after - before, progress)
         for (before, baking, progress), (after, _, _) in pairwise(TEST_OT_pauses.events)
         if baking or not during_bake
     ]
-    return sorted(found, reverse=True)[:count]
+    return sorted(areas, reverse=True)[:count]
 
 
 @contextmanager

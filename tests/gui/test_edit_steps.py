@@ -51,9 +51,9 @@ def test_nothing_goes_wrong_on_the_console(facts):
 def test_a_box_chooses_the_steps_in_it_and_they_are_dragged_together(facts):
     chosen, wanted = facts["boxed"]
     assert chosen == wanted
-    one, other = facts["dragged together"]
-    assert one == pytest.approx(0.2, abs=0.02)
-    assert other == pytest.approx(one, abs=1e-5)
+    first, other = facts["dragged together"]
+    assert first == pytest.approx(0.2, abs=0.02)
+    assert other == pytest.approx(first, abs=1e-5)
 
 
 def test_a_mesh_presses_a_step_until_that_is_undone(facts):

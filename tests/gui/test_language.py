@@ -17,7 +17,7 @@ def facts(tell):
     return tell("language")
 
 
-def own(language):
+def translation_in(language):
     return json.loads((CATALOGUES / f"{language}.json").read_text(encoding="utf-8"))
 
 
@@ -28,7 +28,7 @@ def test_in_english_no_catalogue_is_read(facts):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_language_that_is_chosen_shows_at_once(facts, language):
     english = facts["at first"]["texts"]
-    assert facts[language]["texts"] == {kind: own(language)[text] for kind, text in english.items()}
+    assert facts[language]["texts"] == {kind: translation_in(language)[text] for kind, text in english.items()}
     assert facts[language]["otherwise in our context"] == []
 
 
@@ -55,7 +55,7 @@ def test_other_languages_show_english(facts, when):
 
 
 def test_a_language_is_followed_after_another_file_was_opened(facts):
-    assert facts["after another file"]["texts"]["button"] == own("de_DE")["Bake Footprints"]
+    assert facts["after another file"]["texts"]["button"] == translation_in("de_DE")["Bake Footprints"]
 
 
 def test_nothing_is_left_once_the_add_on_is_off(facts):
@@ -79,7 +79,7 @@ except RuntimeError as error:
 def test_reports_and_reasons_are_in_the_language_that_blender_starts_with(suite):
     conftest.installed(suite)
     printed = conftest.blender(suite, "run", "-b", "--python-expr", IN_GERMAN)
-    german = own("de_DE")
+    german = translation_in("de_DE")
     for text in (
         "Copied the details: paste them into your report, below what you did and what happened",
         "Add a character first: select its armature and press Add Character",

@@ -18,5 +18,5 @@ def test_blender_s_own_tool_finds_the_package_valid(suite):
 
 def test_enabling_it_prints_nothing(suite):
     printed = conftest.installed(suite)
-    own = [line for line in printed.splitlines() if "softground" in line.lower()]
-    assert own == []
+    lines = [line for line in printed.splitlines() if "softground" in line.lower()]
+    assert lines == []

@@ -27,9 +27,9 @@ def facts(tell):
 
 def longest(facts, what):
     """The longest of something in each bake [s]; of them the shortest."""
-    found = [bake[f"longest {what}"] for bake in facts["bakes"]]
-    print(f"longest {what} of each bake (s, progress):", *found, sep="\n")
-    return min(first[0][0] for first in found)
+    pauses = [bake[f"longest {what}"] for bake in facts["bakes"]]
+    print(f"longest {what} of each bake (s, progress):", *pauses, sep="\n")
+    return min(first[0][0] for first in pauses)
 
 
 @pytest.mark.benchmark

@@ -83,8 +83,8 @@ def test_the_same_walk_gives_the_same_body_from_every_file_of_markers(tmp_path):
     for other in others:
         for name, path in marked.motion.joints.items():
             np.testing.assert_allclose(other.motion.joints[name], path, atol=1e-6, err_msg=name)
-        for one, two in zip(marked.shape.soles, other.shape.soles, strict=True):
-            np.testing.assert_allclose(one.landmark_positions(), two.landmark_positions(), atol=1e-4)
+        for sole, two in zip(marked.shape.soles, other.shape.soles, strict=True):
+            np.testing.assert_allclose(sole.landmark_positions(), two.landmark_positions(), atol=1e-4)
 
 
 def test_a_mass_that_nobody_tells_is_that_of_a_person_of_this_size():

@@ -42,7 +42,7 @@ def labels():
 
 
 def names(text, known):
-    """Whether a message names something of the panel, or how to get there."""
+    """True if a message names something of the panel, or how to get there."""
     way_there = re.search(r"\w > [A-Z]|--set\b|\bN-panel\b|\bEdit Mode\b", text)
     return bool(way_there) or any(label in text for label in known)
 

@@ -56,9 +56,9 @@ def test_a_page_of_a_shot_names_buttons_and_panels_as_they_are(page, names):
 @pytest.mark.parametrize("page", SHOTS, ids=lambda page: page.stem)
 def test_a_page_of_a_shot_is_short_and_leads_to_the_reference(page):
     assert len(page.read_text(encoding="utf-8").splitlines()) <= 35
-    found = [target for target, _ in targets(page)]
-    assert sum(target.parent.name == "images" for target in found) <= 3
-    assert any(target.parent == ROOT / "docs" for target in found)
+    linked = [target for target, _ in targets(page)]
+    assert sum(target.parent.name == "images" for target in linked) <= 3
+    assert any(target.parent == ROOT / "docs" for target in linked)
 
 
 def test_the_front_page_leads_to_every_shot_and_the_readme_to_it():

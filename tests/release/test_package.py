@@ -37,9 +37,9 @@ def test_it_holds_the_extension_and_nothing_else(built):
     about = ("blender_manifest.toml", "__init__.py", "README.md", "LICENSE", "CHANGELOG.md")
     with zipfile.ZipFile(built) as archive:
         pages = manual.files(ROOT)
-        own = [*about, *(path.relative_to(ROOT).as_posix() for path in code)]
-        assert archive.namelist() == sorted([*own, *pages])
-        assert all(archive.read(name) == (ROOT / name).read_bytes() for name in own)
+        files = [*about, *(path.relative_to(ROOT).as_posix() for path in code)]
+        assert archive.namelist() == sorted([*files, *pages])
+        assert all(archive.read(name) == (ROOT / name).read_bytes() for name in files)
         assert all(archive.read(name) == pages[name] for name in pages)
 
 

@@ -47,7 +47,7 @@ def calls(tree):
 
 
 def writes(tree):
-    """Whether files are written to otherwise than under the name that `replacing` gives."""
+    """True if files are written to otherwise than under the name that `replacing` gives."""
     given = {
         item.optional_vars.id
         for node in ast.walk(tree)
@@ -68,37 +68,37 @@ def writes(tree):
 @pytest.mark.parametrize("barred", [THREADS, NETWORK, LOADERS], ids=["threads", "network", "loaders"])
 def test_no_module_is_imported_for(barred):
     """Blender does not support threads in extensions ("Python Threads are Not Supported" in its reference)."""
-    found = [(path, name) for path, tree in TREES.items() for name in imports(tree) if name.split(".")[0] in barred]
-    assert found == []
+    faults = [(path, name) for path, tree in TREES.items() for name in imports(tree) if name.split(".")[0] in barred]
+    assert faults == []
 
 
 def test_nothing_beyond_blender_and_pythons_library_is_imported():
     known = sys.stdlib_module_names | {"bpy", "bpy_extras", "bmesh", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
-    found = {(path, name) for path, tree in TREES.items() for name in imports(tree) if name.split(".")[0] not in known}
-    assert found == set()
+    faults = {(path, name) for path, tree in TREES.items() for name in imports(tree) if name.split(".")[0] not in known}
+    assert faults == set()
 
 
 def test_no_text_is_executed():
-    found = [
+    faults = [
         (path, ast.unparse(call))
         for path, tree in TREES.items()
         for call, name in calls(tree)
         if name in EXECUTION and isinstance(call.func, ast.Name)
     ]
-    assert found == []
+    assert faults == []
 
 
 @pytest.mark.parametrize(
     "name", ["sys.path", "sys.modules", "os.system", "os.chdir", "Path.home", "os.path.expanduser"]
 )
 def test_nothing_uses(name):
-    found = [
+    faults = [
         path
         for path, tree in TREES.items()
         for node in ast.walk(tree)
         if isinstance(node, ast.Attribute) and ast.unparse(node) == name
     ]
-    assert found == []
+    assert faults == []
 
 
 def test_only_the_batch_starts_processes():
@@ -109,13 +109,13 @@ def test_only_the_batch_starts_processes():
 
 def test_nothing_is_left_of_older_kinds_of_add_ons():
     """`bl_info`, and `__name__` for the name of the package."""
-    found = {
+    faults = {
         (path, node.id)
         for path, tree in TREES.items()
         for node in ast.walk(tree)
         if isinstance(node, ast.Name) and node.id in ("bl_info", "__name__")
     }
-    assert found == {("softground_addon/__main__.py", "__name__")}
+    assert faults == {("softground_addon/__main__.py", "__name__")}
 
 
 def test_who_knows_the_extensions_own_folder_writes_nothing():
@@ -125,10 +125,10 @@ def test_who_knows_the_extensions_own_folder_writes_nothing():
         if any(isinstance(node, ast.Name) and node.id == "__file__" for node in ast.walk(tree))
     }
     assert knowing
-    found = [
+    faults = [
         (path, name) for path, tree in knowing.items() for _, name in calls(tree) if name in ("replacing", "mkdir")
     ]
-    assert found + [(path, call) for path, tree in knowing.items() for call in writes(tree)] == []
+    assert faults + [(path, call) for path, tree in knowing.items() for call in writes(tree)] == []
 
 
 def test_files_are_written_whole_and_nowhere_else():
@@ -138,13 +138,13 @@ def test_files_are_written_whole_and_nowhere_else():
 def test_no_path_is_cut_at_slashes():
     """Windows has others; `pathlib` knows them."""
     cutting = {"split", "rsplit", "partition", "rpartition"}
-    found = [
+    faults = [
         (path, ast.unparse(call))
         for path, tree in TREES.items()
         for call, name in calls(tree)
         if name in cutting and {ast.unparse(word) for word in call.args} & {"'/'", r"'\\'", "os.sep"}
     ]
-    assert found == []
+    assert faults == []
 
 
 def test_text_has_the_same_line_ends_on_every_system():

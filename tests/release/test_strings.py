@@ -55,17 +55,17 @@ def test_a_catalogue_is_sorted_with_a_text_on_each_line(language):
 
 @languages
 def test_texts_are_in_their_language(language):
-    for text, own in translation.catalogue(language).items():
+    for text, translated in translation.catalogue(language).items():
         if WORD.search(NAMES.sub("", text)):
-            assert re.search(SCRIPTS[language], own), text
-        assert own.strip() == own != ""
-        assert own.endswith(".") or language != "de_DE" or not text.endswith("."), text
+            assert re.search(SCRIPTS[language], translated), text
+        assert translated.strip() == translated != ""
+        assert translated.endswith(".") or language != "de_DE" or not text.endswith("."), text
 
 
 @pytest.mark.parametrize("language", ["ja_JP", "zh_HANS"])
 def test_no_english_is_left_in_other_scripts(language):
-    for text, own in translation.catalogue(language).items():
-        assert not WORD.findall(NAMES.sub("", own)), text
+    for text, translated in translation.catalogue(language).items():
+        assert not WORD.findall(NAMES.sub("", translated)), text
 
 
 def test_no_text_that_is_composed_goes_past_the_translation():

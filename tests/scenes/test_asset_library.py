@@ -71,8 +71,8 @@ def test_nothing_lies_outside_the_file(opened):
 def test_a_print_under_weather_plays_in_a_file_of_the_user_s(library):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     title = weather.PRESETS["SNOWFALL"][0]
-    with bpy.data.libraries.load(str(library / asset_library.BLEND)) as (there, wanted):
-        wanted.objects = [name for name in there.objects if name == f"Print in {title}"]
+    with bpy.data.libraries.load(str(library / asset_library.BLEND)) as (stored, wanted):
+        wanted.objects = [name for name in stored.objects if name == f"Print in {title}"]
     (tile,) = wanted.objects
     bpy.context.scene.collection.objects.link(tile)
     depth = {}

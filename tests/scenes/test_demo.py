@@ -42,13 +42,13 @@ def lanes(demo, scene):
     from softground_addon.core.record import record
 
     bpy.ops.wm.open_mainfile(filepath=str(demo[0] / "demo.blend"))
-    found = {}
+    heights = {}
     for preset in PRESETS:
         ground = bpy.data.objects[f"{preset} Ground"]
         footprints = record.load(ground.data["softground_record"]).footprints
         walker = bpy.data.objects[footprints[0].character]
-        found[preset] = (footprints, np.array(walker.location))
-    return found
+        heights[preset] = (footprints, np.array(walker.location))
+    return heights
 
 
 def footfalls():

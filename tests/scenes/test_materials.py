@@ -16,14 +16,14 @@ def ensure_material(scene):
 
 def upstream(socket):
     """Nodes that an input depends on."""
-    found = set()
+    kinds = set()
     waiting = [link.from_node for link in socket.links]
     while waiting:
         node = waiting.pop()
-        if node not in found:
-            found.add(node)
+        if node not in kinds:
+            kinds.add(node)
             waiting += [link.from_node for inlet in node.inputs for link in inlet.links]
-    return found
+    return kinds
 
 
 def principled(material):

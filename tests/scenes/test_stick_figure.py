@@ -30,9 +30,9 @@ def test_every_bone_has_its_stick_around_it_as_the_rig_moves(figure, scene):
     places = np.array([vertex.co for vertex in posed.data.vertices])
     owner = np.array([vertex.groups[0].group for vertex in figure.data.vertices])
     for bone in figure.parent.pose.bones:
-        own = places[owner == figure.vertex_groups[bone.name].index]
+        of_bone = places[owner == figure.vertex_groups[bone.name].index]
         for end in (bone.head, bone.tail):
-            assert np.linalg.norm(own - np.array(end), axis=1).min() < 0.08
+            assert np.linalg.norm(of_bone - np.array(end), axis=1).min() < 0.08
 
 
 def test_a_rig_without_bones_gets_no_figure(scene):

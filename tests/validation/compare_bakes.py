@@ -1,4 +1,4 @@
-"""Whether two versions press the same ground: the records in .blend files of the same names, side by side.
+"""True if two versions press the same ground: the records in .blend files of the same names, side by side.
 
     python -m tests.validation.compare_bakes FOLDER_BEFORE FOLDER_AFTER
 
@@ -22,17 +22,19 @@ def records(file: Path) -> dict[str, list[Footprint]]:
     bpy.ops.wm.open_mainfile(filepath=str(file))
     stored = {mesh.name: mesh.get(ground_mesh.RECORD) for mesh in bpy.data.meshes}
     return {
-        name: list(record.load(bytes(memoryview(one).cast("B"))).footprints)
-        for name, one in stored.items()
-        if one is not None
+        name: list(record.load(bytes(memoryview(item).cast("B"))).footprints)
+        for name, item in stored.items()
+        if item is not None
     }
 
 
 def difference(before: list[Footprint], after: list[Footprint]) -> float:
     """Largest difference of compression or rim between two records, over all cells [m]."""
-    one, other = recompose(before), recompose(after)
-    keys = one.tiles.keys() | other.tiles.keys()
-    return max((float(np.abs(one.tiles.get(key, 0.0) - other.tiles.get(key, 0.0)).max()) for key in keys), default=0.0)
+    first, other = recompose(before), recompose(after)
+    keys = first.tiles.keys() | other.tiles.keys()
+    return max(
+        (float(np.abs(first.tiles.get(key, 0.0) - other.tiles.get(key, 0.0)).max()) for key in keys), default=0.0
+    )
 
 
 def main(before: Path, after: Path) -> int:

@@ -107,7 +107,7 @@ def scaled(module: ModuleType | None, name: str, factor: float) -> Iterator[None
 
 
 def imports(module: ModuleType, source: ModuleType | None, name: str) -> bool:
-    """Whether `module` has its `name` from `source`: the same object."""
+    """True if `module` has its `name` from `source`: the same object."""
     return getattr(module, name, None) is getattr(source, name)
 
 

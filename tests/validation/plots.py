@@ -71,7 +71,7 @@ def plot_boots(facts: list[dict[str, Any]], depth_cm: Callable[[float], float], 
         label = "measured: median, quartiles" if number == 0 else None
         axes.plot([low, high], [fact["depth_median_cm"]] * 2, color="0.45", linewidth=2.0, label=label)
     hardness = np.linspace(1.0, 5.0, 41)
-    axes.plot(hardness, [depth_cm(one) for one in hardness], color="tab:red", linewidth=1.8, label="SoftGround")
+    axes.plot(hardness, [depth_cm(each) for each in hardness], color="tab:red", linewidth=1.8, label="SoftGround")
     axes.set_xticks(range(1, 6), ["fist", "four fingers", "one finger", "pencil", "knife"])
     axes.set(xlabel="hand hardness of the snow", ylabel="depth of a boot, 33 kPa [cm]", ylim=(0, None))
     axes.legend(frameon=False)

@@ -28,9 +28,9 @@ def test_strikes_and_leaves_are_as_near_to_the_plates_as_the_forces(name):
         measured = dict(zip(errors, crossings(trial.forces[:, foot, 2]), strict=True))
         for kind, collected in errors.items():
             wanted = ("heel_strike", "land") if kind == "strike" else ("toe_off",)
-            found = np.array([r["time_s"] for r in rows if r["phase"] in wanted and r["contact"] == sole.sole.name])
+            times = np.array([r["time_s"] for r in rows if r["phase"] in wanted and r["contact"] == sole.sole.name])
             true = measured[kind][saw[np.rint(measured[kind]).astype(int)]] / trial.rate
-            collected += [np.abs(found - one).min() for one in true]
+            collected += [np.abs(times - each).min() for each in true]
     for kind, collected in errors.items():
         assert collected, kind
         assert np.mean(collected) * 1e3 <= BAR_MS, kind

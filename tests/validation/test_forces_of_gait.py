@@ -61,8 +61,8 @@ def test_errors_are_as_wide_as_their_standard_deviations_say():
         bearing = seen[:, None] & (np.maximum(loads.forces.forces[::steps, :, 2], trial.forces[..., 2]) > 20)
         deviation = force_deviation(loads)[::steps]
         inside.append([np.mean(error[bearing] < width * deviation[bearing]) for width in (1, 2)])
-    one, two = np.median(inside, axis=0)
-    assert 0.6 < one < 0.9
+    first, two = np.median(inside, axis=0)
+    assert 0.6 < first < 0.9
     assert two > 0.9
 
 
@@ -190,8 +190,8 @@ def test_the_frame_rate_hardly_changes_the_curves(name, most, rate):
     given = motion_of_trial(trial)
     other = motion_of_trial(at_rate(trial, rate))
     reference, forces = forces_at_frames(given)[..., 2], forces_at_frames(other)[..., 2]
-    there = np.stack([np.interp(given.times, other.times, column) for column in forces.T], axis=1)
-    change = (there - reference)[given.times <= other.times[-1]] / (trial.mass * 9.81)
+    forces_there = np.stack([np.interp(given.times, other.times, column) for column in forces.T], axis=1)
+    change = (forces_there - reference)[given.times <= other.times[-1]] / (trial.mass * 9.81)
     assert np.sqrt((change**2).mean(axis=0)).max() < most
 
 

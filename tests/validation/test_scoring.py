@@ -64,8 +64,8 @@ def test_points_and_twists_are_scored_where_they_are_measured():
     centres, moments = np.zeros((200, 2, 3)), np.zeros((200, 2))
     off, twisted = centres + np.array((0.03, 0.04, 1.0)), moments + 2.0
     off[50:60], twisted[50:] = np.nan, np.nan
-    told = score_points(centres, moments, (off, twisted), frames((0, 100)))
-    assert told.rms_centre_mm == pytest.approx(50.0)
-    assert told.rms_free_moment_nm == pytest.approx(2.0)
+    score = score_points(centres, moments, (off, twisted), frames((0, 100)))
+    assert score.rms_centre_mm == pytest.approx(50.0)
+    assert score.rms_free_moment_nm == pytest.approx(2.0)
     assert score_points(centres, moments, (None, None), frames((0, 100))) == PointScore()
     assert score_points(centres, moments, (np.nan * off, None), frames((0, 100))) == PointScore()

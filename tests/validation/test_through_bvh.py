@@ -34,16 +34,16 @@ def test_a_skeleton_of_rigid_bones_is_about_as_near_as_the_joints(name):
 def test_the_library_reads_a_bvh_as_blender_and_the_add_on_do(name):
     """Two readers of the file that share no line; Blender keeps single precision."""
     trial = read(name)
-    here, there = (
+    here, back = (
         read_bvh(trial.bvh, mass=trial.mass).motion,
         motion_of_bvh(trial.bvh, mass=trial.mass, rate=trial.rate),
     )
-    assert here.joints.keys() == there.joints.keys()
-    for joint, path in there.joints.items():
+    assert here.joints.keys() == back.joints.keys()
+    for joint, path in back.joints.items():
         np.testing.assert_allclose(here.joints[joint], path, atol=1e-5, err_msg=joint)
-    for mine, theirs in zip(here.soles, there.soles, strict=True):
+    for mine, theirs in zip(here.soles, back.soles, strict=True):
         np.testing.assert_allclose(mine.landmark_positions(), theirs.landmark_positions(), atol=1e-5)
-    one, two = (estimate_loads(Body(motion, motion)) for motion in (here, there))
-    for mine, theirs in zip(one.soles, two.soles, strict=True):
+    direct, two = (estimate_loads(Body(motion, motion)) for motion in (here, back))
+    for mine, theirs in zip(direct.soles, two.soles, strict=True):
         np.testing.assert_allclose(mine.contacts, theirs.contacts, atol=2 / 120)  # thresholds round to the next step
         assert np.sqrt(((mine.force - theirs.force) ** 2).mean()) < 0.01 * trial.mass * 9.81

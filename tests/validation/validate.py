@@ -55,9 +55,9 @@ def validate(trial: Trial, output: Path) -> Iterator[dict[str, object]]:
         if not scored.any():
             print(f"{trial.name}: the plates show none of it whole, nothing to score")
             continue
-        curves, told = dict(estimates(motion)), Told.of(estimated_by_library(body))
-        yield from rows(trial, path, scored, curves, told)
-        plot_trial(trial, path, curves, told.deviation, scored, output / f"{trial.name}_{path}.png")
+        curves, estimated = dict(estimates(motion)), Told.of(estimated_by_library(body))
+        yield from rows(trial, path, scored, curves, estimated)
+        plot_trial(trial, path, curves, estimated.deviation, scored, output / f"{trial.name}_{path}.png")
 
 
 def motions_of(trial: Trial) -> Iterator[tuple[str, CharacterMotion]]:

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.numerics.arrays import Array
-from ..compat import new_channels, new_curve, set_slot
+from ..compat import action_curves, new_channels, new_curve, set_slot, slot_of
 
 
 @dataclass(frozen=True)
@@ -65,3 +65,14 @@ def assign_action(obj: bpy.types.Object, action: bpy.types.Action) -> None:
 def path_of_bone(bone: str, channel: str) -> str:
     """Data path of a channel of a bone, from its armature."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{channel}'
+
+
+def animated_paths(obj: bpy.types.Object | bpy.types.Key) -> set[tuple[str, int]]:
+    """Data paths and indices that the object's action, strips (muted ones too) and drivers set."""
+    animation = obj.animation_data
+    if animation is None:
+        return set()
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    played = [(owner.action, slot_of(owner)) for owner in (animation, *strips) if owner.action]
+    curves = [curve for action, slot in played for curve in action_curves(action, slot)]
+    return {(curve.data_path, curve.array_index) for curve in (*curves, *animation.drivers)}

@@ -53,7 +53,7 @@ class Coverage:
     missed : float
         Share of the prints' area that has few of them around.
     is_fine_somewhere : bool
-        Whether the ground is fine enough anywhere, such as under other prints.
+        True if the ground is fine enough anywhere, such as under other prints.
     """
 
     spacing: float
@@ -61,7 +61,7 @@ class Coverage:
     is_fine_somewhere: bool
 
     def is_coarse(self, cell_size: float) -> bool:
-        """Return whether prints are not well shown."""
+        """True if prints are not well shown."""
         return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
 
 
@@ -94,7 +94,7 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
 
 
 def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, sole_length: float) -> bool:
-    """Return whether the ground is to be refined along the trail; InputError if it must be and may not.
+    """True if the ground is to be refined along the trail; InputError if it must be and may not.
 
     `sole_length` is that of the shortest sole [m].
     """

@@ -25,8 +25,7 @@ from ..reading.shots import settings_of
 from ..response import response_job
 from ..response.character_keys import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ..rigs.frame_ranges import animated_frames
-from ..sampling.sampling_scene import object_named, sampling_scene, still_there
-from ..sampling.temporary import handlers_silent
+from ..sampling.sampling_scene import depsgraph_at, object_named, sampling_scene
 from ..translation import translated
 from . import bake_report
 
@@ -141,16 +140,12 @@ def _read(scene: bpy.types.Scene, name: str, start: float, share: float) -> Job[
     places = np.empty((len(frames), len(bones), 3))
     with sampling_scene(scene, name, watched, ()) as temporary:
         for done, frame in enumerate(frames):
-            with handlers_silent():
-                still_there(temporary).frame_set(frame)
-                depsgraph = still_there(temporary).view_layers[0].depsgraph
-                assert depsgraph is not None
-                evaluated = object_named(name).evaluated_get(depsgraph)
-                for place, bone in enumerate(bones):
-                    owner = evaluated.pose.bones[bone] if bone else evaluated
-                    poses[done, place] = _local(evaluated, bone)
-                    places[done, place] = owner.location
-                    turns[bone].append(tuple(owner.rotation_euler[:]))
+            evaluated = object_named(name).evaluated_get(depsgraph_at(temporary, frame))
+            for place, bone in enumerate(bones):
+                owner = evaluated.pose.bones[bone] if bone else evaluated
+                poses[done, place] = _local(evaluated, bone)
+                places[done, place] = owner.location
+                turns[bone].append(tuple(owner.rotation_euler[:]))
             yield Progress("sample", start + share * (done + 1) / len(frames))
     times, size = np.array(frames) * stretch, settings.units_of(scene).unit_scale_m * armature.matrix_world.median_scale
     curves: dict[str, list[LayerCurve]] = {}

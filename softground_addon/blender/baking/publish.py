@@ -23,7 +23,7 @@ from ...core.playback.playback_curves import playback_curves_at
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.record import BakeRecord, dump
-from ...core.record.sole_marks import sole_marks
+from ...core.relief.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.settings import Acts, BakeSettings
 from .. import settings

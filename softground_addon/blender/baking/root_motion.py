@@ -14,9 +14,8 @@ from ...core.response.root_motion import lacking_velocity
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
 from .. import settings
-from ..animation_layer.animated_paths import animated_paths
 from ..animation_layer.constraint_layer import LayerKind, check_layerable, notes_of, remove_layer
-from ..animation_layer.layer_curves import LayerCurve, path_of_bone
+from ..animation_layer.layer_curves import LayerCurve, animated_paths, path_of_bone
 from ..characters.character_setup import characters_of
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import estimate_shot, read_shot, settings_of

@@ -12,8 +12,8 @@ from mathutils import Vector
 from ...core.findings import Finding, listed
 from ...core.settings import BakeSettings
 from .. import settings
-from ..animation_layer.animated_paths import animated_paths
 from ..animation_layer.constraint_layer import is_own
+from ..animation_layer.layer_curves import animated_paths
 from ..characters.selection import all_leaders
 from ..compat import HAS_SLOTS, slot_of
 from ..ground.still_ground import changes_shape

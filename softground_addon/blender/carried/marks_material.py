@@ -8,7 +8,7 @@ import bpy
 
 from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ..compat import shader_tree
-from ..shader_graph import Graph, Socket
+from ..nodes.shader_graph import Graph, Socket
 from . import marks_nodes as nodes
 
 COVERED = 0.16

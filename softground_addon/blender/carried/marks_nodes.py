@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.weather import weather
-from ..node_graph import NodeGraph, Number
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Marks"
 VERSION = 2
@@ -33,24 +33,19 @@ MELTED = "melted"
 """Share of snow that has melted, 0 to 1."""
 
 INPUTS = (
-    (
+    GroupInput(
         "Drying",
         0.2,
-        0.0,
-        50.0,
         "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
+        (0.0, 50.0),
     ),
-    ("Temperature", 10.0, -60.0, 60.0, "Temperature of the floor in °C: above 0, snow on it melts"),
-    (
-        "Rain",
-        0.0,
-        0.0,
-        200.0,
-        "Rain in millimetres per hour: it keeps marks wet and washes them off, 90 % by 13 mm",
+    GroupInput("Temperature", 10.0, "Temperature of the floor in °C: above 0, snow on it melts", (-60.0, 60.0)),
+    GroupInput(
+        "Rain", 0.0, "Rain in millimetres per hour: it keeps marks wet and washes them off, 90 % by 13 mm", (0.0, 200.0)
     ),
-    ("Time Scale", 1.0, 0.0, 1e7, "How many times faster than the animation marks dry and melt"),
+    GroupInput("Time Scale", 1.0, "How many times faster than the animation marks dry and melt", (0.0, 1e7)),
 )
-"""Name, value, least, most and description of each of the group's inputs; only snow has a temperature."""
+"""Sliders; only snow has a temperature."""
 WASH_OFF = 0.18
 """Share that a millimetre of rain washes off paved ground, of what is there [1/mm]: 90 % by half an inch (J. D. Sartor
 and G. B. Boyd, EPA-R2-72-081, 1972, as in the Storm Water Management Model)."""
@@ -61,10 +56,11 @@ MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
 def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     """A new node group for marks of a surface, in a scene whose time counts so many frames per second."""
     assert surface.carried is not None
-    graph = NodeGraph(new_group(GROUP, MARK))
-    geometry, sliders = _inputs(graph, surface)
-    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
-    age = (graph.number(frame) - graph.number(graph.attribute(BIRTH))) / frame_rate
+    inputs = [each for each in INPUTS if each.name != "Temperature" or surface.melts]
+    graph = NodeGraph(new_group(GROUP, MARK, inputs))
+    chosen = graph.node("NodeGroupInput").outputs
+    geometry, sliders = chosen["Geometry"], {name: graph.number(chosen[name]) for name, *_ in inputs}
+    age = (graph.number(graph.frame()) - graph.number(graph.attribute(BIRTH))) / frame_rate
     is_none = graph.compare("LESS_THAN", graph.attribute(MASS), 0.0)
     geometry = graph.without(geometry, graph.either(graph.compare("LESS_THAN", age.socket, 0.0), is_none))
     passed = age * sliders["Time Scale"]
@@ -81,16 +77,3 @@ def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     remains = graph.number(graph.attribute(MASS)) * (fallen * -WASH_OFF).exp()
     graph.finish(graph.store(geometry, MASS, remains.socket, True))
     return graph.tree
-
-
-def _inputs(graph: NodeGraph, surface: SurfaceRecord | Liquid) -> tuple[Any, dict[str, Number]]:
-    interface = graph.tree.interface
-    for way in ("INPUT", "OUTPUT"):
-        interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    entries = [entry for entry in INPUTS if entry[0] != "Temperature" or surface.melts]
-    for name, value, least, most, description in entries:
-        socket = interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
-        socket.default_value, socket.min_value, socket.max_value = value, least, most
-        socket.description = description
-    group = graph.node("NodeGroupInput")
-    return group.outputs["Geometry"], {name: graph.number(group.outputs[name]) for name, *_ in entries}

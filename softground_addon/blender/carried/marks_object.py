@@ -22,7 +22,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import marks_nodes as nodes
 from .marks_material import material_for
@@ -182,18 +182,8 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     place = marks.position / unit_scale
     place[:, 2] += marks.mass / record.density / unit_scale
     origin = marks.position[0] / unit_scale
-    mesh = bpy.data.meshes.new(NAME)
-    mesh[ORIGIN], mesh[FLOORS], mesh[THICKNESS] = (
-        origin.tolist(),
-        _text(marks.floors),
-        1.0 / record.density / unit_scale,
-    )
-    mesh.vertices.add(len(place))
-    mesh.vertices.foreach_set("co", (place - origin).astype(np.float32).ravel())
     corners, starts = marks.faces.ravel(), 4 * np.arange(len(marks.faces))
     edges, of_corner = face_edges(corners, starts)
-    mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)
-    mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
     columns = (
         (nodes.BIRTH, "FLOAT", marks.birth * units.time_stretch),
         (nodes.MASS, "FLOAT", _or_nothing(marks.mass, marks.step)),
@@ -204,6 +194,10 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
         (nodes.STEP, "INT", marks.step),
         (nodes.SOLE, "FLOAT_VECTOR", marks.sole),
     )
-    mesh_arrays.add_attributes(mesh, columns)
+    mesh = mesh_arrays.points(NAME, place - origin, columns)
+    mesh[ORIGIN], mesh[FLOORS] = origin.tolist(), _text(marks.floors)
+    mesh[THICKNESS] = 1.0 / record.density / unit_scale
+    mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
     mesh.update()
     return mesh

@@ -109,11 +109,12 @@ def add_object_contacts(options: Any, character: SoftGroundCharacter, props: Ite
 
 
 def _side_of(name: str) -> str:
-    """Side that a name tells by its end, as Blender's own mirror names do."""
+    """'LEFT', 'RIGHT' or 'NONE', by the ending of a name (`.L`, `.R`)."""
     return next((side for end, side in ((".L", "LEFT"), (".R", "RIGHT")) if name.upper().endswith(end)), "NONE")
 
 
 def check_printable(options: Any, obj: bpy.types.Object) -> None:
+    """Raise InputError, with the remedy, if an object cannot print, is the ground, or prints already."""
     check_libraries(obj)
     if obj.type != "MESH":
         raise InputError(

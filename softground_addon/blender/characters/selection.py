@@ -73,7 +73,7 @@ def _check_no_crowd(scene: bpy.types.Scene, picked: Sequence[bpy.types.Object]) 
 
 
 def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
-    """Return whether the selection names no character to add: nothing, a camera, or Blender's first cube alone."""
+    """True if the selection names no character to add: nothing, a camera, or Blender's first cube alone."""
     if len(selected) != 1:
         return not selected
     obj = selected[0]
@@ -83,7 +83,7 @@ def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
 
 
 def moves(obj: bpy.types.Object) -> bool:
-    """Return whether keys, drivers, constraints, a parent or a simulation could move a mesh, or its vertices."""
+    """True if keys, drivers, constraints, a parent or a simulation could move a mesh, or its vertices."""
     return is_animated(obj) or is_simulated(obj) or deforms(obj)
 
 

@@ -46,19 +46,32 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
         prog="softground", description="Physically based footprints for animated characters."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    _add_bake(commands.add_parser("bake", help="bake the footprints of a shot"), standalone=standalone)
-    _add_clean(commands.add_parser("clean", help="take sliding and floating out of the feet"), standalone=standalone)
-    _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
+    for name, purpose, add in (
+        ("bake", "bake the footprints of a shot", _add_bake),
+        ("clean", "take sliding and floating out of the feet", _add_clean),
+        ("export", "write a baked ground for other programs", _add_export),
+    ):
+        of_shot = commands.add_parser(name, help=purpose)
+        of_shot.set_defaults(blend=None)
+        if standalone:
+            of_shot.add_argument("blend", type=Path, metavar="SHOT.blend", help="the shot's file")
+        of_shot.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
+        of_shot.add_argument(
+            "--frames", type=_frame_range, metavar="A-B", help="first and last frame (default: the shot's own)"
+        )
+        add(of_shot)
     command.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
     return parser
 
 
-def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
-    if standalone:
-        bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
-    bake.add_argument("--scene", metavar="NAME", help="scene to bake, if it is not the one that the file opens with")
+def _add_destination(parser: argparse.ArgumentParser) -> None:
+    destination = parser.add_mutually_exclusive_group()
+    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the shot under this name")
+    destination.add_argument("--in-place", action="store_true", help="save the shot over the opened file")
+
+
+def _add_bake(bake: argparse.ArgumentParser) -> None:
     bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
-    bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
     bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
     bake.add_argument(
         "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",
@@ -70,9 +83,7 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
         choices=("layer", "keys"),
         help="lower the feet into their prints: as a layer, or in the keys of a new action",
     )
-    destination = bake.add_mutually_exclusive_group()
-    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
-    destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
+    _add_destination(bake)
     bake.add_argument("--report", type=Path, metavar="FILE.json", help="write the report to this file")
     bake.add_argument("--progress", choices=command.PROGRESS_STYLES, default="plain", help="how to show progress")
     bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
@@ -80,30 +91,18 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
         "--receipt", type=Path, metavar="FILE.json", help="write the checksums of what was read and written"
     )
     bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
-    bake.set_defaults(blend=None)
 
 
-def _add_clean(clean: argparse.ArgumentParser, *, standalone: bool) -> None:
-    if standalone:
-        clean.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file whose feet to clean")
-    clean.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
-    clean.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
+def _add_clean(clean: argparse.ArgumentParser) -> None:
     clean.add_argument("--root-motion", action="store_true", help="add root motion first to cycles on the spot")
-    destination = clean.add_mutually_exclusive_group()
-    destination.add_argument(
-        "--save", type=Path, metavar="FILE.blend", help="save the shot with its layer under this name"
-    )
-    destination.add_argument("--in-place", action="store_true", help="save the shot over the opened file")
+    _add_destination(clean)
     clean.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write a report of the feet, before and after, to this file"
     )
-    clean.set_defaults(blend=None, preset=None, edits=None, receipt=None)
+    clean.set_defaults(preset=None, edits=None, receipt=None)
 
 
-def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
-    if standalone:
-        export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
-    export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
+def _add_export(export: argparse.ArgumentParser) -> None:
     formats = tuple(map(_format, export_formats.FORMATS))
     export.add_argument("--format", required=True, type=_format, choices=formats, help="kind of file")
     export.add_argument(
@@ -111,9 +110,6 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
         help="output file, with the format's suffix or none; for images, a folder and how their names begin "
         "(default: beside the shot)",
     )  # fmt: skip
-    export.add_argument(
-        "--frames", type=_frame_range, metavar="A-B", help="first and last frame (default: those of the bake)"
-    )
     export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
     export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
     export.add_argument(
@@ -121,7 +117,6 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     )
     export.add_argument("--stereo", action="store_true", help="for wav: hear the steps from the camera")
     export.add_argument("--outdated", action="store_true", help="export even if the bake is outdated")
-    export.set_defaults(blend=None)
 
 
 def _format(text: str) -> str:

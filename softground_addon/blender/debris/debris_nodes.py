@@ -15,8 +15,8 @@ from typing import Any
 
 import bpy
 
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Debris"
 MARK = "softground_debris"
@@ -25,7 +25,7 @@ MARK = "softground_debris"
 BIRTH, FLIGHT, DRAG = "softground_birth", "softground_flight", "softground_drag"
 """Of a point: frame of its birth, time in the air [s], settling speed over gravity [s]."""
 SMALL = "softground_small"
-"""Whether it is one of the seen round points."""
+"""True if it is one of the seen round points."""
 START, LAUNCH = "softground_start", "softground_launch"
 """Its first place [Blender units] and its first speed [Blender units/s]."""
 RANK = "softground_rank"
@@ -38,6 +38,19 @@ SHAPED = 4000
 """How many of the largest pieces have a shape at first."""
 FULL_TURNS = 12.0
 """How fast pieces turn in the air [rad/s]."""
+
+INPUTS = (
+    GroupInput("Wind", None, "Wind in metres per second, which carries the flying pieces along", kind="Vector"),
+    GroupInput("Amount", 1.0, "Share of the pieces that are shown", (0.0, 1.0)),
+    GroupInput(
+        "Shaped",
+        SHAPED,
+        "How many of the largest pieces have a shape; all others are round, and play much faster",
+        (0, 2**31 - 1),
+        "Int",
+    ),
+    GroupInput("Shapes", None, "Objects of radius 1 for the large pieces, one picked for each", kind="Collection"),
+)
 
 
 def build(
@@ -69,8 +82,7 @@ def build(
     graph = _Graph()
     geometry, wind, amount, shaped, collection = graph.inputs(shapes)
     geometry = _thinned(graph, geometry, amount)
-    frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
-    since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
+    since = graph.math("DIVIDE", graph.math("SUBTRACT", graph.frame(), graph.attribute(BIRTH)), frame_rate)
     geometry = graph.store(geometry, AGE, since, True)
     geometry = _moved(graph, geometry, wind, gravity=gravity, unit_scale=unit_scale)
     geometry = graph.forgotten(geometry, BIRTH, DRAG, START, LAUNCH)
@@ -101,9 +113,8 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
     remaining = graph.math("EXPONENT", graph.math("DIVIDE", graph.math("MULTIPLY", time, -1.0), drag))
     passed = graph.math("MULTIPLY", drag, graph.math("SUBTRACT", 1.0, remaining))
     launch = graph.attribute(LAUNCH, "FLOAT_VECTOR")
-    fall = graph.node("ShaderNodeCombineXYZ")
-    graph.link(graph.math("MULTIPLY", drag, -gravity / unit_scale), fall.inputs["Z"])
-    drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall.outputs["Vector"])
+    fall = graph.combined(0.0, 0.0, graph.math("MULTIPLY", drag, -gravity / unit_scale))
+    drift = graph.vector("ADD", graph.scaled(wind, 1.0 / unit_scale), fall)
     moved = graph.vector("ADD", graph.scaled(launch, passed), graph.scaled(drift, graph.math("SUBTRACT", time, passed)))
     speed = graph.vector(
         "ADD", graph.scaled(launch, remaining), graph.scaled(drift, graph.math("SUBTRACT", 1.0, remaining))
@@ -119,78 +130,55 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
 
 def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
     """The small ones as round points."""
-    points = graph.node("GeometryNodeMeshToPoints")
-    graph.link(geometry, points.inputs["Mesh"])
-    graph.link(graph.attribute(SMALL, "BOOLEAN"), points.inputs["Selection"])
-    graph.link(graph.attribute(RADIUS), points.inputs["Radius"])
-    return graph.shown(points.outputs["Points"], material)
+    inputs = {"Mesh": geometry, "Selection": graph.attribute(SMALL, "BOOLEAN"), "Radius": graph.attribute(RADIUS)}
+    return graph.shown(graph.node("GeometryNodeMeshToPoints", inputs).outputs["Points"], material)
 
 
 def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> Any:
     """Some points as instances of shapes, which turn as long as they fly, and come to lie on their flat side."""
-    info = graph.node("GeometryNodeCollectionInfo")
-    info.inputs["Separate Children"].default_value = True
-    info.inputs["Reset Children"].default_value = True
-    graph.link(collection, info.inputs["Collection"])
+    children = {"Collection": collection, "Separate Children": True, "Reset Children": True}
+    shapes = graph.node("GeometryNodeCollectionInfo", children).outputs[0]
     time = graph.math("MINIMUM", graph.attribute(AGE), graph.attribute(FLIGHT))
     remaining = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
     heading = graph.random((0.0, 0.0, 0.0), (0.0, 0.0, 2 * pi), 4, "FLOAT_VECTOR")
-    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), remaining), heading)
-    on_points = graph.node("GeometryNodeInstanceOnPoints")
-    on_points.inputs["Pick Instance"].default_value = True
-    for source, socket in (
-        (geometry, "Points"),
-        (selection, "Selection"),
-        (info.outputs[0], "Instance"),
-        (graph.random(0, 100, 3, "INT"), "Instance Index"),
-        (turn, "Rotation"),
-        (graph.attribute(RADIUS), "Scale"),
-    ):
-        graph.link(source, on_points.inputs[socket])
-    return on_points.outputs["Instances"]
+    turns = graph.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, 0, "FLOAT_VECTOR")
+    turn = graph.vector("ADD", graph.scaled(turns, remaining), heading)
+    inputs = {
+        "Points": geometry,
+        "Selection": selection,
+        "Instance": shapes,
+        "Pick Instance": True,
+        "Instance Index": graph.random(0, 100, 3, "INT"),
+        "Rotation": turn,
+        "Scale": graph.attribute(RADIUS),
+    }
+    return graph.node("GeometryNodeInstanceOnPoints", inputs).outputs["Instances"]
 
 
 class _Graph(NodeGraph):
     """The debris' group, while it is built."""
 
     def __init__(self) -> None:
-        super().__init__(new_group(GROUP, MARK))
+        super().__init__(new_group(GROUP, MARK, INPUTS))
 
     def inputs(self, shapes: bpy.types.Collection) -> list[Any]:
         """Geometry, wind, amount, how many are shaped, and shapes."""
-        interface = self.tree.interface
-        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        wind = interface.new_socket("Wind", in_out="INPUT", socket_type="NodeSocketVector")
-        wind.description = "Wind in metres per second, which carries the flying pieces along"
-        amount = interface.new_socket("Amount", in_out="INPUT", socket_type="NodeSocketFloat")
-        amount.default_value, amount.min_value, amount.max_value = 1.0, 0.0, 1.0
-        amount.description = "Share of the pieces that are shown"
-        shaped = interface.new_socket("Shaped", in_out="INPUT", socket_type="NodeSocketInt")
-        shaped.default_value, shaped.min_value = SHAPED, 0
-        shaped.description = "How many of the largest pieces have a shape; all others are round, and play much faster"
-        collection = interface.new_socket("Shapes", in_out="INPUT", socket_type="NodeSocketCollection")
-        collection.default_value = shapes
-        collection.description = "Objects of radius 1 for the large pieces, one picked for each"
+        self.tree.interface.items_tree["Shapes"].default_value = shapes
         group = self.node("NodeGroupInput")
-        return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
+        return [group.outputs[name] for name in ("Geometry", *(name for name, *_ in INPUTS))]
 
-    def shown(self, geometry: Any, material: Any, selection: Any = None) -> Any:
+    def shown(self, geometry: Any, material: Any, selection: Any = True) -> Any:
         """Geometry with a material on some or all of it."""
-        node = self.node("GeometryNodeSetMaterial")
-        self.link(geometry, node.inputs["Geometry"])
-        node.inputs["Material"].default_value = material
-        if selection is not None:
-            self.link(selection, node.inputs["Selection"])
-        return node.outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Selection": selection, "Material": material}
+        return self.node("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
 
     def has_look(self, number: int) -> Any:
-        """Return whether a point has a look of several."""
+        """True if a point has a look of several."""
         look = self.math("SUBTRACT", self.attribute(LOOK, "INT"), float(number))
         return self.less(self.math("ABSOLUTE", look), 0.5)
 
     def less(self, first: Any, second: Any) -> Any:
-        """Return whether one is less than the other."""
+        """True if one is less than the other."""
         return self.compare("LESS_THAN", first, second)
 
     def joined(self, *geometries: Any) -> Any:
@@ -206,6 +194,3 @@ class _Graph(NodeGraph):
         for name, value in (("Min", low), ("Max", high), ("Seed", seed)):
             self.link(value, next(socket for socket in sockets if socket.name == name))
         return next(socket for socket in node.outputs if socket.enabled)
-
-    def random_turn(self, seed: int) -> Any:
-        return self.random((-FULL_TURNS,) * 3, (FULL_TURNS,) * 3, seed, "FLOAT_VECTOR")

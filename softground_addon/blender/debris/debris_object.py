@@ -19,7 +19,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import inputs_of, modifier_with, set_inputs
+from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on, matrix_in
 from ..settings import find, name_of
 from . import debris_nodes as nodes
@@ -229,10 +229,6 @@ def _points(debris: Debris, origin: Vector, units: SceneUnits, looks: Sequence[i
     rank = np.empty(len(debris.radius))
     rank[np.argsort(-debris.radius, kind="stable")] = np.arange(len(rank))
     order = np.argsort(rank >= nodes.SHAPED, kind="stable")  # then what is seen is one run of points, copied as such
-    points = bpy.data.meshes.new(NAME)
-    points[ORIGIN] = origin[:]
-    points.vertices.add(len(debris.birth))
-    points.vertices.foreach_set("co", (rest / unit_scale)[order].astype(np.float32).ravel())
     columns = (
         (nodes.BIRTH, "FLOAT", debris.birth * time_stretch),
         (nodes.FLIGHT, "FLOAT", debris.time),
@@ -245,5 +241,7 @@ def _points(debris: Debris, origin: Vector, units: SceneUnits, looks: Sequence[i
         (nodes.STEP, "INT", debris.step),
         *([(nodes.LOOK, "INT", np.array(looks))] if any(looks) else []),
     )
-    mesh_arrays.add_attributes(points, ((name, kind, values[order]) for name, kind, values in columns))
+    in_order = ((name, kind, values[order]) for name, kind, values in columns)
+    points = mesh_arrays.points(NAME, (rest / unit_scale)[order], in_order)
+    points[ORIGIN] = origin[:]
     return points

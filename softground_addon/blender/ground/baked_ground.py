@@ -52,7 +52,7 @@ class Place:
     publish : callable
         Shows the written display mesh, takes away what stood in its place, and returns what carries the bake.
     is_draft : bool
-        Whether the display mesh is a new object, in no scene yet.
+        True if the display mesh is a new object, in no scene yet.
     """
 
     index: Indices
@@ -68,7 +68,7 @@ def display_mesh_of(ground: bpy.types.Object) -> bpy.types.Object:
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
-    """Return whether a bake is on this ground."""
+    """True if a bake is on this ground."""
     return ground_mesh.is_baked(display_mesh_of(ground))
 
 
@@ -78,7 +78,7 @@ def is_deleted(ground: bpy.types.Object) -> bool:
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
-    """Return whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
+    """True if `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
     return ground_mesh.has_remains(display_mesh_of(ground)) or hidden_ground.hides(ground)
 
 

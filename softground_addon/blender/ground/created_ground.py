@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -20,7 +19,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
 from ..materials.materials import EDGE, drafted, ensure_material
-from ..mesh_arrays import add_faces
+from ..mesh_arrays import add_attributes, add_faces
 from ..placement import to_world
 from ..settings import find, name_of, resolve
 from .ground_mesh import discard, mesh_of, write_positions
@@ -33,7 +32,7 @@ COARSEST = 0.4
 where so many would exceed `MAX_GRID_VERTICES`, as between characters that are kilometres apart."""
 
 BLUR_REACH = 3.0
-"""How far the display blur carries, in standard deviations."""
+"""Cut-off of the display blur [standard deviations]."""
 
 
 @dataclass(frozen=True)
@@ -179,8 +178,7 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
     yield
     if edge > 0:
         inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
-        fading: Any = mesh_of(resolve(name)).attributes.new(EDGE, "FLOAT", "POINT")
-        fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
+        add_attributes(mesh_of(resolve(name)), [(EDGE, "FLOAT", np.clip(1.0 - inward / edge, 0.0, 1.0))])
     return name
 
 

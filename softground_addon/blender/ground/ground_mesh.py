@@ -39,12 +39,12 @@ def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
-    """Return whether a bake is on this ground."""
+    """True if a bake is on this ground."""
     return has_remains(ground) and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
-    """Return whether a bake is on this ground, or at least what a bake would take away again."""
+    """True if a bake is on this ground, or at least what a bake would take away again."""
     return ground.type == "MESH" and own_data.has_made(mesh_of(ground), REST)
 
 

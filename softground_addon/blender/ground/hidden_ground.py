@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import bpy
 
-from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.layer_curves import animated_paths
 from . import ground_mesh, ground_surface
 
 WAS_HIDDEN = "softground_was_hidden"
@@ -18,12 +18,12 @@ _BY_DEFAULT = (False, False, True, True)
 
 
 def hides(ground: bpy.types.Object) -> bool:
-    """Return whether the ground is hidden in favour of a copy."""
+    """True if the ground is hidden in favour of a copy."""
     return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def may_hide(ground: bpy.types.Object) -> bool:
-    """Return whether the ground stays hidden once it is, with nothing that shows it again at another frame."""
+    """True if the ground stays hidden once it is, with nothing that shows it again at another frame."""
     return not any(path in _SHOWN for path, _ in animated_paths(ground))
 
 
@@ -63,7 +63,7 @@ def show_again(ground: bpy.types.Object) -> None:
 
 
 def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
-    """Return whether the ground has particles, or instances while some of its modifiers are shown, by their names."""
+    """True if the ground has particles, or instances while some of its modifiers are shown, by their names."""
     if ground.particle_systems:
         return True
     if not any(modifier.type == "NODES" and modifier.name in shown for modifier in ground.modifiers):

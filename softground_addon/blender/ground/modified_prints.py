@@ -35,7 +35,7 @@ def are_undone(
     detail: str,
     frame: GroundFrame | None = None,
 ) -> bool:
-    """Return whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
+    """True if the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def are_undone(
     unit_scale : float
         Metres per Blender unit.
     detail : str
-        Whether there may be a copy without modifiers, in the words of the settings.
+        True if there may be a copy without modifiers, in the words of the settings.
     frame : GroundFrame, optional
         That the positions and the terrain are in.
 

@@ -48,7 +48,7 @@ def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
 
 
 def is_there(ground: bpy.types.Object, name: str) -> bool:
-    """Return whether a ground has a vertex group or an attribute of that name."""
+    """True if a ground has a vertex group or an attribute of that name."""
     return bool(name) and (name in ground.data.attributes or name in ground.vertex_groups)
 
 

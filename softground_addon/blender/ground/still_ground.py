@@ -6,9 +6,9 @@ from typing import Any
 
 import bpy
 
-from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.layer_curves import animated_paths
 from ..compat import node_inputs
-from ..node_modifiers import named_by_nodes, nodes_of
+from ..nodes.node_modifiers import named_by_nodes, nodes_of
 from . import ground_mesh
 
 TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")

@@ -18,9 +18,9 @@ from ...core.ground.surfaces import SurfaceRecord
 from ..compat import shader_tree
 from ..drafts import none_left_if_it_fails
 from ..ground_slots import MARK, OVER
+from ..nodes.shader_graph import Graph, Socket
 from ..playback.own_data import COMPRESSION, LAYER, RIM, SOLE
 from ..playback.weather_nodes import FRESH
-from ..shader_graph import Graph, Socket
 from . import surface_shaders
 from .surface_shaders import Ground, Look
 from .weather_look import bare, under_weather

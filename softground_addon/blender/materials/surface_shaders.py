@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..nodes.shader_graph import Graph, Socket
 from ..playback.own_data import WATER
-from ..shader_graph import Graph, Socket
 
 RIPPLE, RIPPLE_HEIGHT, LEE = 0.085, 0.0055, 0.68
 """From crest to crest of wind ripples, their height [m], and the part of a wave that faces the wind."""

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...core.ground.surfaces import SurfaceRecord
+from ..nodes.shader_graph import Graph, Socket
 from ..playback.weather_nodes import BLOWN, DRIED, FRESH, WATER, WETNESS
-from ..shader_graph import Graph, Socket
 
 NEW_SNOW = (0.915, 0.935, 0.96)
 SOAKED = (0.42, 0.38, 0.34)

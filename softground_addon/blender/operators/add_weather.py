@@ -57,7 +57,7 @@ class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is weather on the scene's ground."""
+        """True if there is weather on the scene's ground."""
         ground = settings.options_of(context).ground
         cls.poll_message_set(translated("There is no weather on the ground"))
         return ground is not None and weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) is not None

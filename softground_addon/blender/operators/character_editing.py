@@ -57,7 +57,7 @@ class _OnCharacter:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character is chosen."""
+        """True if a character is chosen."""
         if active_character(settings.options_of(context)) is None:
             cast("Any", cls).poll_message_set(translated("Add a character first"))
             return False
@@ -128,7 +128,7 @@ class _ReadingCharacter(_OnCharacter, Reading):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character is chosen, and no other job runs."""
+        """True if a character is chosen, and no other job runs."""
         return super().poll(context) and Reading.poll.__func__(cls, context)
 
 

@@ -41,7 +41,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh is selected that may be covered."""
+        """True if a mesh is selected that may be covered."""
         cls.poll_message_set(translated("Select the mesh to cover, in Object Mode"))
         return context.mode == "OBJECT" and selected_ground(context) is not None
 
@@ -77,17 +77,14 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
 @none_left_if_it_fails()
 def _object_of(laid: Cover, name: str, unit: float, thickness: float) -> bpy.types.Object:
     """A cover as an object that is in no scene yet; its layer is painted as deep as it is."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(laid.vertices))
-    mesh.vertices.foreach_set("co", (laid.vertices / unit).astype(np.float32).ravel())
+    depth = SoftGroundPainted.bl_rna.properties["layer_depth"].default
+    mesh = mesh_arrays.points(name, laid.vertices / unit, [(depth, "FLOAT", laid.thickness / thickness)])
     mesh.loops.add(laid.faces.size)
     mesh.loops.foreach_set("vertex_index", laid.faces.astype(np.int32).ravel())
     mesh.polygons.add(len(laid.faces))
     mesh.polygons.foreach_set("loop_start", np.arange(0, laid.faces.size, laid.faces.shape[1], dtype=np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(laid.faces), bool))
     mesh.update(calc_edges=True)
-    depth = SoftGroundPainted.bl_rna.properties["layer_depth"].default
-    mesh_arrays.add_attributes(mesh, [(depth, "FLOAT", laid.thickness / thickness)])
     return bpy.data.objects.new(name, mesh)
 
 

@@ -55,7 +55,7 @@ class SOFTGROUND_OT_remove_hard_ground(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether an object is chosen in the list."""
+        """True if an object is chosen in the list."""
         return chosen_of(settings.options_of(context), "hard_grounds", "active_hard_ground") is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -20,7 +20,7 @@ class _Bake(ModalJob):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is something to bake; otherwise the button says what is missing."""
+        """True if there is something to bake; otherwise the button says what is missing."""
         reason = why_no_start(context)
         if not reason and session.current().is_live:
             reason = "Live mode is on: press Keep or Discard first"

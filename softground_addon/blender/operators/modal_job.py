@@ -69,7 +69,7 @@ class ModalJob(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether no other job runs."""
+        """True if no other job runs."""
         cls.poll_message_set(translated(BUSY))
         return not session.current().is_baking
 
@@ -285,7 +285,7 @@ class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether there is a bake to cancel."""
+        """True if there is a bake to cancel."""
         cls.poll_message_set(translated("No bake is running"))
         return bool(session.current().is_baking)
 
@@ -343,7 +343,7 @@ def _check_still_there(needed: dict[int, str]) -> None:
 
 
 def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
-    """Return whether an event neither edits, saves nor renders: it navigates, or clicks in grey panels."""
+    """True if an event neither edits, saves nor renders: it navigates, or clicks in grey panels."""
     if event.type.startswith(_NAVIGATION):
         return not event.ctrl  # the wheel turns a field's value with it
     if event.type != "LEFTMOUSE":

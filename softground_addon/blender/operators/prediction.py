@@ -9,23 +9,30 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
+from bpy.props import FloatProperty
 
 from ...core.composers.prediction import matching_modulus, next_modulus
 from ...core.errors import InputError
-from ...core.ground.deep_ground import wading
 from ...core.loads.cell_limits import Fineness
 from ...core.motion.motion import shortest_sole
 from ...core.settings import BakeSettings
+from ...core.soles.deep_ground import wading
 from .. import jobs, session, settings
 from ..live import live
+from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..reading.analysis import Analysis
 from ..state import state
+from ..translation import translated
+from .modal_job import ReadingShot, Reports
 
 SOON = 0.03
 """Time from the drawing that finds something changed until it is worked out anew [s]."""
+AT_REST = 0.3
+"""Time without a change after which the depth is worked out from all contacts, in place of a sample [s]."""
 
 PART = 0.025
 """What is worked on before Blender has its turn again, beside the step that is being done when it is over [s]."""
@@ -54,7 +61,7 @@ class DepthPrediction:
     depth : float or None
         Of the typical print to expect [m], as it was known last.
     is_current : bool
-        Whether nothing has changed since.
+        True if nothing has changed since.
     """
 
     analysis: Analysis
@@ -102,6 +109,7 @@ def _prediction(uid: int, known: Analysis | None, wanted: BakeSettings) -> Depth
         return None
     depth = analysis.known_depth(known, wanted)
     if depth is None:
+        _stop_refining()
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)
         return DepthPrediction(known, state.shown_depths.get(uid), is_current=False)
@@ -171,23 +179,100 @@ def _work_out() -> float | None:
     if live.is_answering():
         return SOON
     if not state.predicting:
-        scenes = {window.scene for window in bpy.context.window_manager.windows}
         for work in (analysis.working_out_depth, settling):  # the last is done first
-            state.predicting.extend(work(scene) for scene in scenes if analysis.known(scene))
+            state.predicting.extend(work(scene) for scene in _shown_scenes())
+    if not _is_done(state.predicting):
+        return PAUSE
+    if not state.aims and not bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.register(_refine, first_interval=AT_REST)
+    return PAUSE if state.aims else None
+
+
+def _refine() -> float | None:
+    """Press all contacts, where the depths that are shown come from a sample of them."""
+    if live.is_answering():
+        return AT_REST
+    if not state.refining:
+        state.refining.extend(analysis.pressing_all(scene) for scene in _shown_scenes())
+    return None if _is_done(state.refining) else PAUSE
+
+
+def _stop_refining() -> None:
+    """Leave what is refined to the next time that nothing changes."""
+    state.refining.clear()
+    if bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.unregister(_refine)
+
+
+def _shown_scenes() -> list[bpy.types.Scene]:
+    """Scenes in windows whose shot is known."""
+    scenes = {window.scene for window in bpy.context.window_manager.windows}
+    return [scene for scene in scenes if analysis.known(scene)]
+
+
+def _is_done(work: list[jobs.Job[None]]) -> bool:
+    """Work for a part of a turn, from the last job on; return whether all is done, which is drawn."""
     until = time.perf_counter() + PART
-    while state.predicting:
-        if next(state.predicting[-1], _ENDED) is _ENDED:
-            state.predicting.pop()
+    while work:
+        if next(work[-1], _ENDED) is _ENDED:
+            work.pop()
         elif time.perf_counter() > until and not bpy.app.background:
-            return PAUSE
+            return False
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
-    return PAUSE if state.aims else None
+    return True
 
 
 def unregister() -> None:
     """Work nothing out any more."""
-    for timer in (_work_out, look_anew):
+    for timer in (_work_out, _refine, look_anew):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
+
+
+class SOFTGROUND_OT_predict_depth(ReadingShot):
+    """Read the animation and predict how deep the prints will be, before any bake. Esc cancels"""
+
+    bl_idname = "softground.predict_depth"
+    bl_label = "Predict Depth"
+    cancelled = "Predict Depth cancelled"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        analysis.forget()
+        known = yield from analysis.reading(scene)
+        depth = yield from analysis.working_out_depth(scene)
+        deepest = known.contacts.depths.max(initial=0.0)
+        text = translated(
+            "Typical step: {typical} cm deep; the deepest: {deepest} cm",
+            typical=f"{(depth or 0.0) * 100:.1f}",
+            deepest=f"{deepest * 100:.1f}",
+        )
+        return [("INFO", text)]
+
+
+class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
+    """Set the stiffness of the ground so that the typical step is as deep as you type"""
+
+    bl_idname = "softground.match_depth"
+    bl_label = "Match Depth"
+    bl_options = {"REGISTER", "UNDO"}
+
+    depth: FloatProperty(
+        name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        depth = analysis.expected_depth(settings.scene_of(context))
+        if depth:
+            self.depth = depth * 100
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_predict_depth, SOFTGROUND_OT_match_depth)

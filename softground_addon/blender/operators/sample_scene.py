@@ -159,7 +159,7 @@ class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether an object can be added."""
+        """True if an object can be added."""
         cls.poll_message_set(translated("Leave Edit Mode first"))
         return context.mode == "OBJECT"
 

@@ -121,7 +121,7 @@ class SOFTGROUND_OT_use_as_ground(Reading):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh is selected that may be the ground."""
+        """True if a mesh is selected that may be the ground."""
         if not super().poll(context):
             return False
         cls.poll_message_set(translated("Select the mesh to walk on, not a character"))
@@ -221,7 +221,7 @@ class SOFTGROUND_OT_select_shown(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a copy of the ground shows the prints, and objects can be selected."""
+        """True if a copy of the ground shows the prints, and objects can be selected."""
         ground = settings.options_of(context).ground
         cls.poll_message_set(translated("The ground shows its prints itself"))
         if ground is None or trail_detail.detail_of(ground) is None:
@@ -283,7 +283,7 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a ground."""
+        """True if there is a ground."""
         cls.poll_message_set(translated("Choose a ground first, or bake one"))
         return settings.exists(settings.options_of(context).ground)
 
@@ -311,7 +311,7 @@ class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether the file on disk is the one that is open."""
+        """True if the file on disk is the one that is open."""
         if not bpy.data.filepath:
             cls.poll_message_set(translated("Save the file first: the command bakes it from there"))
             return False

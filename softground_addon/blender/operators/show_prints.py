@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from .. import settings
 from ..baking import bake_report
-from ..ground import baked_ground, ground_mesh
+from ..ground import baked_ground, baked_steps, ground_mesh
+from ..ground.baked_steps import BakedStep
 from ..operator_base import OnBake
 from ..placement import in_scene
 from ..state import state
-from . import baked_steps
-from .baked_steps import BakedStep
 
 SHOWN = 4
 """Prints that the view frames."""

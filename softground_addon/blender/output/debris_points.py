@@ -11,8 +11,8 @@ import bpy
 from .. import compat, settings
 from ..debris import debris_nodes as nodes
 from ..debris import debris_object
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import new_group
 
 
 @contextmanager
@@ -46,22 +46,15 @@ def selected(ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
 def _group(debris: bpy.types.Object, clouds: bool) -> Any:
     """Nodes that give the points of an object and of its instances."""
     graph = NodeGraph(new_group("SoftGround Debris Points", nodes.MARK))
-    graph.tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    source = graph.node("GeometryNodeObjectInfo")
-    source.transform_space = "RELATIVE"
-    source.inputs["Object"].default_value = debris
-    parts = graph.node("GeometryNodeSeparateComponents")
-    graph.link(source.outputs["Geometry"], parts.inputs["Geometry"])
-    pieces = graph.node("GeometryNodeInstancesToPoints")
-    graph.link(parts.outputs["Instances"], pieces.inputs["Instances"])
-    graph.link(graph.attribute(nodes.RADIUS), pieces.inputs["Radius"])
+    source = graph.node("GeometryNodeObjectInfo", {"Object": debris}, transform_space="RELATIVE")
+    parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": source.outputs["Geometry"]})
+    of_pieces = {"Instances": parts.outputs["Instances"], "Radius": graph.attribute(nodes.RADIUS)}
+    pieces = graph.node("GeometryNodeInstancesToPoints", of_pieces)
     joined = graph.node("GeometryNodeJoinGeometry")
     graph.link(parts.outputs["Point Cloud"], joined.inputs["Geometry"])
     graph.link(pieces.outputs["Points"], joined.inputs["Geometry"])
     geometry = graph.forgotten(joined.outputs["Geometry"], nodes.FLIGHT, nodes.RANK)
     if not clouds:
-        vertices = graph.node("GeometryNodePointsToVertices")
-        graph.link(geometry, vertices.inputs["Points"])
-        geometry = vertices.outputs["Mesh"]
+        geometry = graph.node("GeometryNodePointsToVertices", {"Points": geometry}).outputs["Mesh"]
     graph.finish(geometry)
     return graph.tree

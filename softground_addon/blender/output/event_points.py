@@ -11,7 +11,7 @@ from bpy.props import EnumProperty
 
 from ...core.events.events import Event, label
 from ...core.events.phases import KINDS
-from .. import settings
+from .. import mesh_arrays, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
 from ..translation import translated
@@ -34,19 +34,16 @@ def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Obje
     Texts become numbers: `phase` in the order of `core.events.phases.KINDS`, `character` and `contact` in the order
     of the lists that the object has as custom properties.
     """
-    points = bpy.data.meshes.new(NAME)
-    points.vertices.add(len(table))
-    place = np.array([row["position"] for row in table], np.float32).reshape(-1, 3)
-    points.vertices.foreach_set("co", (place / scene.unit_settings.scale_length).ravel())
-    for name in _NUMBERS:
-        _store(points, name, "FLOAT", "value", np.array([row[name] for row in table], np.float32))
-    normals = np.array([row["normal"] for row in table], np.float32)
-    _store(points, "normal_of_ground", "FLOAT_VECTOR", "vector", normals.ravel())
-    shown = _fresh(scene, points)
+    place = np.array([row["position"] for row in table], float).reshape(-1, 3) / scene.unit_settings.scale_length
     texts = {name: list(dict.fromkeys(row[name] for row in table)) for name in ("character", "contact")}
-    for name, known in ({"phase": list(KINDS)} | texts).items():
-        numbers = np.array([known.index(row[name]) for row in table], np.int32)
-        _store(points, name, "INT", "value", numbers)
+    texts["phase"] = list(KINDS)
+    columns = (
+        *((name, "FLOAT", np.array([row[name] for row in table])) for name in _NUMBERS),
+        ("normal_of_ground", "FLOAT_VECTOR", np.array([row["normal"] for row in table])),
+        *((name, "INT", np.array([known.index(row[name]) for row in table])) for name, known in texts.items()),
+    )
+    shown = _fresh(scene, mesh_arrays.points(NAME, place, columns))
+    for name, known in texts.items():
         shown[f"{name}s"] = ", ".join(known)
     return shown
 
@@ -76,11 +73,6 @@ def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
     if not older.users:
         bpy.data.meshes.remove(older)
     return shown
-
-
-def _store(points: bpy.types.Mesh, name: str, kind: Any, field: str, values: Any) -> None:
-    attribute: Any = points.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set(field, values)
 
 
 def _events(context: bpy.types.Context) -> list[Event]:

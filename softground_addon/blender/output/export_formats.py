@@ -13,13 +13,16 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ...core.errors import InputError
+from ...core.events import event_files, event_midi
+from ...core.events.events import between
+from ...core.files import files
 from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
 from ..translation import translated
-from . import event_exports, exports, image_exports, opensim_exports, sound_exports
+from . import exports, image_exports, opensim_exports, sound_exports
 
 LARGEST_IMAGE = 16384
 """Most pixels along the sides of an image."""
@@ -92,10 +95,18 @@ def _still(ground: bpy.types.Object, options: Options) -> list[Path]:
     return [options.path]
 
 
-def _events(ground: bpy.types.Object, options: Options) -> list[Path]:
-    rate = settings.frame_rate_of(settings.scene_of(bpy.context))
-    event_exports.write(baked_ground.events_of(ground), rate, options.format, options.path, options.start, options.end)
-    return [options.path]
+def _events(dump: Callable[..., str | bytes], *, is_timed: bool = True) -> Writer:
+    """A writer of the events of some frames, their times counted from the first; `is_timed` needs the frame rate."""
+
+    def writer(ground: bpy.types.Object, options: Options) -> list[Path]:
+        rate = settings.frame_rate_of(settings.scene_of(bpy.context))
+        table = between(baked_ground.events_of(ground), options.start, options.end, rate)
+        content = dump(table, frame_rate=rate) if is_timed else dump(table)
+        with files.replacing(options.path) as partial:
+            partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        return [options.path]
+
+    return writer
 
 
 def _opensim(_ground: bpy.types.Object, options: Options) -> list[Path]:
@@ -104,15 +115,8 @@ def _opensim(_ground: bpy.types.Object, options: Options) -> list[Path]:
 
 
 def _sound(ground: bpy.types.Object, options: Options) -> list[Path]:
-    sound_exports.write(
-        settings.scene_of(bpy.context),
-        ground,
-        options.path,
-        options.start,
-        options.end,
-        samples=options.samples,
-        stereo=options.stereo,
-    )
+    scene, frames = settings.scene_of(bpy.context), (options.start, options.end)
+    sound_exports.write(scene, ground, options.path, *frames, samples=options.samples, stereo=options.stereo)
     return [options.path]
 
 
@@ -167,14 +171,48 @@ FORMATS = {
     "OBJ": Format(
         ".obj", "Final Mesh (OBJ)", "The ground as it is after the last step", _still, _BUILT.io_wavefront_obj
     ),
-    **{
-        kind: Format(suffix, label, description, _events)
-        for kind, (suffix, label, description, _) in event_exports.KINDS.items()
-    },
-    **{
-        kind: Format(suffix, label, description, _opensim)
-        for kind, (suffix, label, description) in opensim_exports.KINDS.items()
-    },
+    "EVENTS_JSON": Format(
+        ".jsonl",
+        "Events (JSON Lines)",
+        "Heel strikes, toe-offs and slides, for game engines",
+        _events(event_files.json_lines),
+    ),
+    "EVENTS_MIDI": Format(
+        ".mid",
+        "Events (MIDI)",
+        "Each step as a note, for samplers and drum machines",
+        _events(event_midi.dump, is_timed=False),
+    ),
+    "EVENTS_REAPER": Format(
+        ".csv",
+        "Events (Reaper)",
+        "Regions and markers for Reaper",
+        _events(event_files.reaper, is_timed=False),
+    ),
+    "EVENTS_EDL": Format(
+        ".edl",
+        "Events (Resolve)",
+        "Timeline markers for DaVinci Resolve",
+        _events(event_files.edl),
+    ),
+    "EVENTS_OTIO": Format(
+        ".otio",
+        "Events (OpenTimelineIO)",
+        "Timeline markers for editors",
+        _events(event_files.otio),
+    ),
+    "OPENSIM_MOT": Format(
+        ".mot",
+        "OpenSim Loads (MOT)",
+        "Forces, centres of pressure and free moments, with the external loads as XML",
+        _opensim,
+    ),
+    "OPENSIM_STO": Format(
+        ".sto",
+        "OpenSim Storage (STO)",
+        "Forces, centres of pressure and free moments as a storage file",
+        _opensim,
+    ),
     "WAV": Format(".wav", "Footsteps (WAV)", "The sound of the steps, computed from their forces", _sound),
 }
 """All formats: a further one is a row here."""

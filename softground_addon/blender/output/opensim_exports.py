@@ -13,16 +13,6 @@ from ...core.files import files, opensim
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
 
-KINDS = {
-    "OPENSIM_MOT": (
-        ".mot",
-        "OpenSim Loads (MOT)",
-        "Forces, centres of pressure and free moments, with the external loads as XML",
-    ),
-    "OPENSIM_STO": (".sto", "OpenSim Storage (STO)", "Forces, centres of pressure and free moments as a storage file"),
-}
-"""Suffix, label and description of each kind of file."""
-
 
 def write(loads: Sequence[CharacterLoads], path: Path, start: int, end: int) -> list[Path]:
     """Write the forces on all soles at the simulation's time steps; with several characters a file each.

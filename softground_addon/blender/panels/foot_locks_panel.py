@@ -23,7 +23,7 @@ class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character with an armature is chosen."""
+        """True if a character with an armature is chosen."""
         cls.poll_message_set(translated("Choose a character with an armature first"))
         character = active_character(settings.options_of(context))
         return bool(character and settings.exists(character.armature))
@@ -67,7 +67,7 @@ class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether one is chosen."""
+        """True if one is chosen."""
         cls.poll_message_set(translated("Select a foot lock in the list first"))
         return chosen_of(active_character(settings.options_of(context)), "holds", "active_hold") is not None
 

@@ -65,7 +65,7 @@ class SOFTGROUND_OT_open_manual(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether this copy of the add-on has a manual."""
+        """True if this copy of the add-on has a manual."""
         cls.poll_message_set(translated("The sources have no manual: read docs/, or install the package"))
         return MANUAL.is_dir()
 

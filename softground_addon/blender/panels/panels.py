@@ -149,7 +149,7 @@ class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
 class _OfCharacter(AdvancedPanel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character is chosen."""
+        """True if a character is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and is_set_up(character))
 
@@ -191,7 +191,7 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character with an armature is chosen."""
+        """True if a character with an armature is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and character.armature)
 

@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ...core.errors import InputError
 from ...core.files import files
 from ...core.ground import presets
-from .. import ground_presets, jobs, settings
+from .. import ground_presets, settings
 from ..characters.character_setup import characters_of, title_of
-from ..operator_base import OnShot, reports_errors
-from ..operators.modal_job import ReadingShot, Reports
+from ..operator_base import reports_errors
 from ..preset_files import listed, loaded, user_folder
 from ..reading import analysis
 from ..translation import CONTEXT, translated
@@ -39,7 +38,7 @@ def picture_of_ground(options: Any) -> int:
 
 def _presets_of(name: str) -> Iterator[tuple[Path, presets.Preset]]:
     """The preset of that name with its file: that which comes with the add-on, and the user's."""
-    for path in (presets.FOLDER / _file_name(name), _file_for(name)):
+    for path in (presets.FOLDER / _shipped_file_name(name), _users_file(name)):
         with suppress(OSError, InputError):
             preset = loaded(path)
             if preset.name == name:
@@ -59,10 +58,10 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
             layout.label(text=title, text_ctxt=CONTEXT)
             for preset in presets.soft_to_firm(built_in for built_in in paths if built_in.section == section):
                 _entry(layout, paths[preset], preset, translate=True)
-        loaded, broken = listed(user_folder())
-        if loaded or broken:
+        own_presets, broken = listed(user_folder())
+        if own_presets or broken:
             layout.separator()
-        for path, preset in loaded:
+        for path, preset in own_presets:
             _entry(layout, path, preset, translate=False)
         for message in broken:
             layout.label(text=message, icon="ERROR", translate=False)
@@ -132,7 +131,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
         layout.use_property_split = True
         layout.prop(self, "name")
         layout.prop(self, "source")
-        if _alike(self.name, user_folder()):
+        if _with_like_name(self.name, user_folder()):
             layout.prop(self, "replace")
 
     @reports_errors
@@ -141,9 +140,9 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
         if not presets.bare(name):
             raise InputError("A preset needs a name with letters or digits: type one.")
         scene = settings.scene_of(context)
-        if _alike(name, presets.FOLDER):
+        if _with_like_name(name, presets.FOLDER):
             raise InputError(f"'{name}' comes with SoftGround: choose another name.")
-        older, path = _alike(name, user_folder()), _file_for(name)
+        older, path = _with_like_name(name, user_folder()), _users_file(name)
         if older and not self.replace:
             raise InputError(
                 f"You have a preset like '{name}' ({older[0].name}): choose another name, or tick Replace."
@@ -168,82 +167,38 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the chosen preset is one of the user's."""
+        """True if the chosen preset is one of the user's."""
         cls.poll_message_set(translated("Built-in presets cannot be deleted; choose one of your own"))
-        return _own(context) is not None
+        return _chosen_of_user(context) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = _own(context)
+        path = _chosen_of_user(context)
         assert path is not None
         path.unlink()
         return {"FINISHED"}
 
 
-def _own(context: bpy.types.Context) -> Path | None:
+def _chosen_of_user(context: bpy.types.Context) -> Path | None:
     """The file of the current preset, if it is the user's."""
     current = _presets_of(settings.options_of(context).material.preset)
     return next((path for path, _ in current if path.parent == user_folder()), None)
 
 
-def _alike(name: str, folder: Path) -> list[Path]:
+def _with_like_name(name: str, folder: Path) -> list[Path]:
     """The presets of a folder that a name cannot be told from: by their letters and digits."""
     wanted = presets.bare(name)
     named = {path for path, preset in listed(folder)[0] if presets.bare(preset.name) == wanted}
     return sorted(named | {path for path in folder.glob("*.json") if presets.bare(path.stem) == wanted})
 
 
-def _file_for(name: str) -> Path:
+def _users_file(name: str) -> Path:
     """File in which the user's preset of that name is kept; names of the same letters and digits share one."""
     return user_folder() / f"{presets.bare(name)}.json"
 
 
-def _file_name(name: str) -> str:
+def _shipped_file_name(name: str) -> str:
     """Name of the file in which a preset comes with the add-on: `Fresh Snow (field)` in `fresh_snow.json`."""
     return name.partition(" (")[0].casefold().replace(" ", "_") + ".json"
-
-
-class SOFTGROUND_OT_predict_depth(ReadingShot):
-    """Read the animation and predict how deep the prints will be, before any bake. Esc cancels"""
-
-    bl_idname = "softground.predict_depth"
-    bl_label = "Predict Depth"
-    cancelled = "Predict Depth cancelled"
-
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        analysis.forget()
-        known = yield from analysis.reading(scene)
-        depth = yield from analysis.working_out_depth(scene)
-        deepest = known.contacts.depths.max(initial=0.0)
-        text = translated(
-            "Typical step: {typical} cm deep; the deepest: {deepest} cm",
-            typical=f"{(depth or 0.0) * 100:.1f}",
-            deepest=f"{deepest * 100:.1f}",
-        )
-        return [("INFO", text)]
-
-
-class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
-    """Set the stiffness of the ground so that the typical step is as deep as you type"""
-
-    bl_idname = "softground.match_depth"
-    bl_label = "Match Depth"
-    bl_options = {"REGISTER", "UNDO"}
-
-    depth: FloatProperty(
-        name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
-    )
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
-        depth = analysis.expected_depth(settings.scene_of(context))
-        if depth:
-            self.depth = depth * 100
-        return context.window_manager.invoke_props_dialog(self)
-
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
-        return {"FINISHED"}
 
 
 CLASSES = (
@@ -251,6 +206,4 @@ CLASSES = (
     SOFTGROUND_OT_load_preset,
     SOFTGROUND_OT_save_preset,
     SOFTGROUND_OT_remove_preset,
-    SOFTGROUND_OT_predict_depth,
-    SOFTGROUND_OT_match_depth,
 )

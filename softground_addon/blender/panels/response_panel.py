@@ -93,7 +93,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a bake has told the speed."""
+        """True if a bake has told the speed."""
         cls.poll_message_set(translated("Bake with Sink Feet or Grounding on first: the bake suggests a speed"))
         character = active_character(settings.options_of(context))
         return bool(character and character.armature and has_layer(character.armature))
@@ -164,7 +164,7 @@ class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a character is chosen."""
+        """True if a character is chosen."""
         character = active_character(settings.options_of(context))
         return bool(character and character.armature)
 

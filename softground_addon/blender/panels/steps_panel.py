@@ -7,10 +7,9 @@ from typing import Any
 import bpy
 
 from .. import settings
-from ..ground import baked_ground
+from ..ground import baked_ground, baked_steps
+from ..ground.baked_steps import BakedStep
 from ..live import live
-from ..operators import baked_steps
-from ..operators.baked_steps import BakedStep
 from ..operators.panel_base import SidebarPanel
 from ..translation import translated
 
@@ -27,7 +26,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a bake that is not about to change."""
+        """True if there is a bake that is not about to change."""
         ground = settings.options_of(context).ground
         return ground is not None and not live.is_on() and baked_ground.is_baked(ground)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.plants.bending import PLANTS
 from .. import compat, mesh_arrays
-from ..node_modifiers import named_by_nodes, nodes_of, set_inputs
+from ..nodes.node_modifiers import named_by_nodes, nodes_of, set_inputs
 from . import give_way_nodes as nodes
 from .trampling_table import modifier_of
 

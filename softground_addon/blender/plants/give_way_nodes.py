@@ -8,7 +8,6 @@ is there. What no sole has come near is only compared.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
@@ -16,8 +15,8 @@ from typing import Any
 import bpy
 
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
-from ..node_graph import NodeGraph, Number
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Give Way"
 MARK = "softground_give_way"
@@ -46,18 +45,17 @@ _ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW = (
 far its root goes up; `_LEAN` the way of what is upright, for its length."""
 _MEANWHILE = (_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW)
 
-INPUTS: Mapping[str, tuple[str, Any, tuple[float, float] | None, str]] = {
-    "Table": ("NodeSocketObject", None, None, "Where and when soles tread: an object that each bake writes"),
-    "Height": ("NodeSocketFloat", 0.3, (0.001, 10.0), "Height of the tallest plants, from which on soles bend them"),
-    "Stiffness": ("NodeSocketFloat", 0.15, (0.0, 1.0), "Share of the bend that springs back as the sole leaves"),
-    "Recovery": ("NodeSocketFloat", 240.0, (0.1, 86400.0), "Seconds in which plants rise to 1/e of their bend"),
-    "Breaks": ("NodeSocketFloat", 0.3, (0.0, 10.0), "How much stays bent for good: 1 is all of it from 150 kPa on"),
-    "Half After": ("NodeSocketFloat", 150.0, (1.0, 10_000.0), "Passes after which half of the plants are worn down"),
-    "Stands": ("NodeSocketBool", True, None, "Plants that bend; off for what lies on the ground and tilts with it"),
-    "Sinks": ("NodeSocketBool", True, None, "Press roots into the prints; off where the scatter follows the ground"),
-    "Loose Parts": ("NodeSocketBool", False, None, "Bend each separate part of a mesh about its lowest vertices"),
-}
-"""What the group asks for: kind of socket, value at first, range, meaning."""
+INPUTS = (
+    GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
+    GroupInput("Height", 0.3, "Height of the tallest plants, from which on soles bend them", (0.001, 10.0)),
+    GroupInput("Stiffness", 0.15, "Share of the bend that springs back as the sole leaves", (0.0, 1.0)),
+    GroupInput("Recovery", 240.0, "Seconds in which plants rise to 1/e of their bend", (0.1, 86400.0)),
+    GroupInput("Breaks", 0.3, "How much stays bent for good: 1 is all of it from 150 kPa on", (0.0, 10.0)),
+    GroupInput("Half After", 150.0, "Passes after which half of the plants are worn down", (1.0, 10000.0)),
+    GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
+    GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
+    GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+)
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
@@ -67,20 +65,9 @@ def ensure_group() -> Any:
     known = next((group for group in bpy.data.node_groups if is_give_way(group) and not group.library), None)
     if known is not None:
         return known
-    tree: Any = new_group(GROUP, MARK)
-    graph = NodeGraph(tree)
-    interface = tree.interface
-    for way in ("INPUT", "OUTPUT"):
-        interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    for name, (kind, value, span, meaning) in INPUTS.items():
-        socket = interface.new_socket(name, in_out="INPUT", socket_type=kind)
-        socket.description = meaning
-        if value is not None:
-            socket.default_value = value
-        if span:
-            socket.min_value, socket.max_value = span
+    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
     _fill(graph)
-    return tree
+    return graph.tree
 
 
 def is_give_way(tree: Any) -> bool:
@@ -106,7 +93,7 @@ class _Table:
 
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
-    frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+    frame = graph.number(graph.frame())
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
     table = _table(graph, chosen["Table"])
     graph.next_row()
@@ -117,7 +104,7 @@ def _fill(graph: NodeGraph) -> None:
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
-    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+    position = graph.position()
     root = _at(graph, position, first, "POINT")
     geometry = _stored(graph, given, "CURVE", root, latest, moved)
     geometry = _put(graph, table, geometry, "CURVE", position)
@@ -136,11 +123,9 @@ def _fill(graph: NodeGraph) -> None:
 
 
 def _table(graph: NodeGraph, obj: Any) -> _Table:
-    info = graph.node("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    graph.link(obj, info.inputs["Object"])
+    info = graph.node("GeometryNodeObjectInfo", {"Object": obj}, transform_space="RELATIVE")
     vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
-    inverted = graph.node("FunctionNodeInvertMatrix")
-    graph.link(to_scatter, inverted.inputs["Matrix"])
+    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter})
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
@@ -150,26 +135,20 @@ def _table(graph: NodeGraph, obj: Any) -> _Table:
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
-    node = graph.node("FunctionNodeTransformDirection")
-    graph.link(direction, node.inputs["Direction"])
-    graph.link(by, node.inputs["Transform"])
-    return node.outputs["Direction"]
+    inputs = {"Direction": direction, "Transform": by}
+    return graph.node("FunctionNodeTransformDirection", inputs).outputs["Direction"]
 
 
 def _at(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOAT_VECTOR") -> Any:
     """Value of a field at one of the elements of the geometry that it is of."""
-    node = graph.node("GeometryNodeFieldAtIndex", data_type=kind, domain=domain)
-    graph.link(value, node.inputs["Value"])
-    graph.link(index, node.inputs["Index"])
-    return node.outputs["Value"]
+    inputs = {"Value": value, "Index": index}
+    return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
 
 
 def _in_cells(graph: NodeGraph, table: _Table) -> Any:
     """The root in cells of the table."""
-    node = graph.node("FunctionNodeTransformPoint")
-    graph.link(graph.attribute(_ROOT, "FLOAT_VECTOR"), node.inputs["Vector"])
-    graph.link(table.from_scatter, node.inputs["Transform"])
-    return node.outputs["Vector"]
+    inputs = {"Vector": graph.attribute(_ROOT, "FLOAT_VECTOR"), "Transform": table.from_scatter}
+    return graph.node("FunctionNodeTransformPoint", inputs).outputs["Vector"]
 
 
 def _bent_passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> Any:
@@ -290,22 +269,19 @@ def _put(graph: NodeGraph, table: _Table, geometry: Any, domain: str, position: 
 def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
     toward, angle, shift = _lean_and_shift(graph, table)
-    turned = graph.node("FunctionNodeRotateVector")
-    graph.link((0.0, 0.0, 1.0), turned.inputs["Vector"])
-    graph.link(graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"], turned.inputs["Rotation"])
+    own_rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
+    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": own_rotation})
     stem = graph.choose("VECTOR", chosen["Stands"], table.up, turned.outputs["Vector"])
     to_lie = graph.number(graph.math("ARCCOSINE", graph.dot(stem, toward)))
-    rotation = graph.node("FunctionNodeAxisAngleToRotation")
-    graph.link(graph.vector("CROSS_PRODUCT", stem, toward), rotation.inputs["Axis"])
-    graph.link((angle * to_lie / (pi / 2)).socket, rotation.inputs["Angle"])
-    rotated, moved = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
-    for node, name, value in ((rotated, "Rotation", rotation.outputs["Rotation"]), (moved, "Translation", shift)):
-        node.inputs["Local Space"].default_value = False
-        graph.link(geometry, node.inputs["Instances"])
-        graph.link(graph.attribute(_TOUCHED, "BOOLEAN"), node.inputs["Selection"])
-        graph.link(value, node.inputs[name])
-        geometry = node.outputs["Instances"]
-    graph.link(graph.attribute(_ROOT, "FLOAT_VECTOR"), rotated.inputs["Pivot Point"])
+    to_ground = {
+        "Axis": graph.vector("CROSS_PRODUCT", stem, toward),
+        "Angle": (angle * to_lie / (pi / 2)).socket,
+    }
+    rotation = graph.node("FunctionNodeAxisAngleToRotation", to_ground).outputs["Rotation"]
+    pivot = {"Rotation": rotation, "Pivot Point": graph.attribute(_ROOT, "FLOAT_VECTOR")}
+    for kind, change in (("Rotate", pivot), ("Translate", {"Translation": shift})):
+        touched = {"Instances": geometry, "Selection": graph.attribute(_TOUCHED, "BOOLEAN"), "Local Space": False}
+        geometry = graph.node(f"GeometryNode{kind}Instances", touched | change).outputs["Instances"]
     return geometry
 
 
@@ -314,8 +290,7 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
 
     What each sum takes is stored first: a sum within another is worked out twice.
     """
-    parts = graph.node("GeometryNodeSeparateComponents")
-    graph.link(geometry, parts.inputs["Geometry"])
+    parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": geometry})
     island = graph.node("GeometryNodeInputMeshIsland").outputs["Island Index"]
     mesh = graph.store(parts.outputs["Mesh"], _PART, island, True, "INT")
     part, low = graph.attribute(_PART, "INT"), graph.attribute(_LOW)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.numerics.arrays import Array
 from .. import compat
-from ..shader_graph import Graph
+from ..nodes.shader_graph import Graph
 
 NAME = "SoftGround Meadow"
 DENSITY, MOST = 6000.0, 60_000

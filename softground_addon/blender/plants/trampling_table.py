@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
-from .. import compat
+from .. import compat, mesh_arrays
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import modifier_with
+from ..nodes.node_modifiers import modifier_with
 from ..placement import hang_on
 from . import give_way_nodes as nodes
 
@@ -112,9 +112,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     for name, kind, values in arrays:
         whole = np.full((count, *values.shape[1:]), NEVER if name == nodes.ACTIVE else 0, values.dtype)
         whole[: len(values)] = values
-        attribute: Any = vertices.attributes.new(name, cast("Any", kind), "POINT")
-        flat = whole.astype(np.int32 if kind == "INT" else np.float32).ravel()
-        attribute.data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
+        mesh_arrays.add_attributes(vertices, [(name, kind, whole)])
 
 
 def _exchange(table: bpy.types.Object, vertices: bpy.types.Mesh) -> None:

@@ -19,7 +19,7 @@ MOST_VERTICES = 250_000
 
 
 def is_dense(ground: bpy.types.Object) -> bool:
-    """Return whether shape keys would make a ground play slower."""
+    """True if shape keys would make a ground play slower."""
     return len(ground.data.vertices) > MOST_VERTICES
 
 

@@ -21,11 +21,11 @@ ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, LAYER, PASSES, *OF_PLAYB
 RECORD = "softground_record"
 SUMMARY = "softground_summary"
 WARNINGS = "softground_warnings"
-FINGERPRINTS = "softground_fingerprints"
+BUILD_STAMP = "softground_fingerprints"
 """What a bake was made from, as JSON."""
 MADE = "softground_made"
 """Property of a mesh that carries a bake: the names of the attributes that the bake has made, in lines."""
-PROPERTIES = (RECORD, SUMMARY, WARNINGS, FINGERPRINTS, MADE)
+PROPERTIES = (RECORD, SUMMARY, WARNINGS, BUILD_STAMP, MADE)
 """Properties of a mesh that carries a bake."""
 
 
@@ -35,7 +35,7 @@ def made(mesh: bpy.types.Mesh) -> set[str]:
 
 
 def has_made(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Return whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
+    """True if a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
     return name in _noted(mesh) and name in mesh.attributes
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ...core.numerics.arrays import Array, Indices
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
+from .. import mesh_arrays
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
-from ..node_modifiers import modifier_with
+from ..nodes.node_modifiers import modifier_with
 from ..settings import find, name_of, resolve
 from . import own_data
 from . import playback_nodes as nodes
@@ -162,7 +163,7 @@ def _remove_table(table: bpy.types.Object) -> None:
 
 
 def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
-    """Return whether the playback moves each vertex, (V,); None where there is none."""
+    """True if the playback moves each vertex, (V,); None where there is none."""
     attribute: Any = mesh.attributes.get(nodes.MOVED)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "BOOLEAN"):
         return None
@@ -203,12 +204,7 @@ def _table_object(lines: PlaybackCurves, position: NDArray[np.float32]) -> bpy.t
         splines.add_curves(lines.size.tolist())
         attribute: Any = splines.attributes["position"]
         attribute.data.foreach_set("vector", position.ravel())
-    _store(splines, nodes.CONTACT, "FLOAT", lines.contact.unpacked())
+    mesh_arrays.add_attributes(splines, [(nodes.CONTACT, "FLOAT", lines.contact.unpacked())])
     if len(lines.size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
-
-
-def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:
-    attribute: Any = geometry.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set("value", values)

@@ -16,8 +16,8 @@ import bpy
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"
@@ -25,7 +25,7 @@ MARK = "softground_playback"
 
 REST = "softground_rest"
 MOVED = "softground_moved"
-"""Whether the bake moves or touches the vertex at all."""
+"""True if the bake moves or touches the vertex at all."""
 START, END = "softground_start", "softground_end"
 """Frame from which on something happens to a vertex, and frame from which on nothing does."""
 SPLINE, OFFSET = "softground_spline", "softground_offset"
@@ -58,9 +58,9 @@ def build(
     frame_rate : float
         Frames of the table per second [Hz].
     few : bool
-        Whether so few of the vertices move that looking all of them up costs less than telling them apart.
+        True if so few of the vertices move that looking all of them up costs less than telling them apart.
     settled : bool
-        Whether the positions that the group is given are those at which vertices come to rest, whatever the user does.
+        True if the positions that the group is given are those at which vertices come to rest, whatever the user does.
     """
     graph = _Graph()
     geometry, frame = graph.inputs(up)
@@ -108,8 +108,8 @@ def build(
 
 
 def is_playback(tree: bpy.types.NodeTree) -> bool:
-    """Return whether a node group is one that `build` made; before it was marked, only its name told."""
-    return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
+    """True if a node group is one that `build` made."""
+    return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
@@ -121,13 +121,23 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     return None
 
 
+INPUTS = (
+    GroupInput(
+        "Shading",
+        True,
+        "Update compression, rim, age and pressure over time, for materials that read them",
+        kind="Bool",
+    ),
+    GroupInput("Up", (0.0, 0.0, 1.0), "World up in the ground's space, one metre long", kind="Vector"),
+)
+
+
 class _KeyframeTables:
     """Values of the keyframe_tables of vertices at a place along their splines."""
 
     def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
-        info = graph.node("GeometryNodeObjectInfo")
-        info.inputs["Object"].default_value = table
-        self._graph, self._splines, self._length = graph, info.outputs["Geometry"], length
+        splines = graph.node("GeometryNodeObjectInfo", {"Object": table}).outputs["Geometry"]
+        self._graph, self._splines, self._length = graph, splines, length
         self._number = graph.attribute(SPLINE, "INT")
 
     def movement(self) -> tuple[Any, Any]:
@@ -148,19 +158,11 @@ class _Graph(NodeGraph):
     """The playback's group, while it is built."""
 
     def __init__(self) -> None:
-        super().__init__(new_group(GROUP, MARK))
+        super().__init__(new_group(GROUP, MARK, INPUTS))
 
     def inputs(self, up: Sequence[float]) -> tuple[Any, Any]:
         """The group's geometry and the scene's frame, with its fraction."""
-        interface = self.tree.interface
-        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        shading = interface.new_socket("Shading", in_out="INPUT", socket_type="NodeSocketBool")
-        shading.default_value = True
-        shading.description = "Update compression, rim, age and pressure over time, for materials that read them"
-        direction = interface.new_socket("Up", in_out="INPUT", socket_type="NodeSocketVector")
-        direction.default_value = tuple(up)
-        direction.description = "World up in the ground's space, one metre long"
+        self.tree.interface.items_tree["Up"].default_value = tuple(up)
         group = self.node("NodeGroupInput")
         self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
-        return group.outputs["Geometry"], self.node("GeometryNodeInputSceneTime").outputs["Frame"]
+        return group.outputs["Geometry"], self.frame()

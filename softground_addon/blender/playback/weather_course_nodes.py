@@ -18,7 +18,7 @@ from typing import Any
 from ...core.weather import weather as w
 from ...core.weather.weather import MOMENTS, NO_WATER, PARTS, Span
 from ...core.weather.weather_places import LEAST_RANGE
-from ..node_graph import NodeGraph, Number
+from ..nodes.node_graph import NodeGraph, Number
 
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
 
@@ -40,7 +40,7 @@ KEYED = "Keyed Sliders"
 """Node with how many sliders are keyed: 0 is none."""
 TABLE, AGES = "Table", "Ages in the Table"
 """Nodes with the object that has what happened after each age, from 0 on, and with the last of these; none below 0.
-What `KEPT` calls *look* is the position, which a mesh has in any case."""
+What `SUMS` calls *look* is the position, which a mesh has in any case."""
 HOLLOWS = "Hollows"
 """Node with the object that has what water needs to know of each hollow: *pool*, what it holds as a depth of water on
 it [m], how much of its soaking is left and the number of the moment from which on it is there; *rise*, coefficients of
@@ -53,13 +53,13 @@ ROWS = MOMENTS + PARTS + 3
 """Of the table: one of what has not begun, the moments, as many parts behind them, and now."""
 ENDLESS = 1e9
 LOWEST = "lowest"
-KEPT = {
+SUMS = {
     "look": ("cover", "variance", "wet"),
     "loss": ("filled", "thawed", "pale"),
     "hollows": ("low", "high", "seeped"),
 }
-"""What is kept of any row, in vectors of these names: as `core.weather.weather_course.Course` has it, but *filled* is
-less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
+"""Sums over time in each row, in vectors of these names: as `core.weather.weather_course.Course` has it, but *filled*
+is less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
 
 
 def field_of(name: str) -> str:
@@ -86,7 +86,7 @@ class CourseNodes:
     """Sums of weather since the first frame, and since the moments of vertices.
 
     What only a slider that is at zero would ask for is not worked out, unless any is keyed. `acts` tells by the names
-    of sliders what may be above 0: warmth for *Temperature*. `around` has by the names of `KEPT` what has happened
+    of sliders what may be above 0: warmth for *Temperature*. `around` has by the names of `SUMS` what has happened
     since the first frame, as far as it is asked for, `aged` the same as fields of `rows`; the first of these is of what
     has not begun, where `begun` is 0 and not 1.
 
@@ -110,7 +110,7 @@ class CourseNodes:
         table: Any,
     ) -> None:
         self.graph, self._matter, self._soaking = graph, matter, soaking
-        self.frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+        self.frame = graph.number(graph.frame())
         self._first, self._step = self._value(FIRST, span.first), self._value(STEP, span.step)
         keyed, none = self._value(KEYED, 0.0), graph.number(0.0)
         self.acts = {name: said[name].at_least(0.0) + keyed for name in SUMMED}
@@ -138,9 +138,9 @@ class CourseNodes:
         tabled = self._tabled(table, ages, span)
         self.rows = graph.choose("GEOMETRY", off, self.rows, worked_out)
         self._vectors = {
-            name: graph.choose("VECTOR", off, *two) for name, *two in zip(KEPT, tabled, summed, strict=False)
+            name: graph.choose("VECTOR", off, *two) for name, *two in zip(SUMS, tabled, summed, strict=False)
         }
-        look, loss, *_ = KEPT
+        look, loss, *_ = SUMS
         self.aged = self._named(lambda vector: vector, look, loss)
         self.around = self._named(
             lambda vector: graph.at_index(self.rows, vector, 1), *((look, loss) if matter.snow_depth else (look,))
@@ -282,10 +282,10 @@ class CourseNodes:
         return self._keep(*(graph.number(self._pack(*three)) for three in (look, (*loss, pale), hollows)))
 
     def _named(self, of_rows: Callable[[Any], Any], *names: str) -> dict[str, Number]:
-        """The numbers of some of the vectors of `KEPT`, from what is made of these."""
+        """The numbers of some of the vectors of `SUMS`, from what is made of these."""
         named: dict[str, Number] = {}
         for name in names:
-            named |= zip(KEPT[name], self.graph.parts(of_rows(self._vectors[name])), strict=True)
+            named |= zip(SUMS[name], self.graph.parts(of_rows(self._vectors[name])), strict=True)
         return named
 
     def _pack(self, *numbers: Number | float) -> Any:

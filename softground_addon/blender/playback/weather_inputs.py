@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
-from ..node_graph import NodeGraph
-from ..node_modifiers import new_group
+from ..nodes.node_graph import NodeGraph
+from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Weather"
 
@@ -17,66 +17,56 @@ MARK = "softground_weather"
 
 
 INPUTS = (
-    ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
-    (
+    GroupInput(
+        "Snowfall", 0.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers", (0.0, 100.0)
+    ),
+    GroupInput(
         "Temperature",
         0.0,
-        -60.0,
-        40.0,
         "Air temperature in °C. Above 0, new snow melts first, then the ground's, trodden snow last",
+        (-60.0, 40.0),
     ),
-    (
+    GroupInput(
         "Wind",
         0.0,
-        0.0,
-        60.0,
         "Wind speed in metres per second, at 10 m. It blows sand into prints from about 5 on, snow from 6",
+        (0.0, 60.0),
     ),
-    ("Rain", 0.0, 0.0, 500.0, "Rain in millimetres per hour. It rounds edges; what does not soak in stands in prints"),
-    (
+    GroupInput(
+        "Rain",
+        0.0,
+        "Rain in millimetres per hour. It rounds edges; what does not soak in stands in prints",
+        (0.0, 500.0),
+    ),
+    GroupInput(
         "Drying",
         0.0,
-        0.0,
-        50.0,
         "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
+        (0.0, 50.0),
     ),
-    (
+    GroupInput(
         "Water Table",
         100.0,
-        0.0,
-        100.0,
         "Water level in centimetres below the brim of each print, to which water seeps in",
+        (0.0, 100.0),
     ),
-    ("Halo", 0.0, 0.0, 1.0, "How pale wet sand turns around a loaded foot; it is wet again seconds later"),
-    (
+    GroupInput("Halo", 0.0, "How pale wet sand turns around a loaded foot; it is wet again seconds later", (0.0, 1.0)),
+    GroupInput(
         "Time Scale",
         1.0,
-        0.0,
-        1e7,
         "How many times faster than the animation the weather runs: 2880 shows 8 hours in 10 seconds",
+        (0.0, 1e7),
     ),
 )
-"""Name, value, least, most and description of each of the group's inputs."""
 
 
 def new() -> Any:
     """A new group with its inputs and nothing in it."""
-    tree = new_group(GROUP, MARK)
-    add_sockets(tree)
-    return tree
-
-
-def add_sockets(tree: Any) -> None:
-    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    for name, value, least, most, description in INPUTS:
-        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
-        socket.default_value, socket.min_value, socket.max_value = value, least, most
-        socket.description = description
+    return new_group(GROUP, MARK, INPUTS)
 
 
 def is_weather(tree: bpy.types.NodeTree) -> bool:
-    """Return whether a node group is one that `new` made."""
+    """True if a node group is one that `new` made."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 

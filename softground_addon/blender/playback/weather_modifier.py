@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import bpy
 
-from .. import node_modifiers
+from ..nodes import node_modifiers
 from . import own_data, playback, weather_inputs, weather_table
 from . import weather_nodes as nodes
 

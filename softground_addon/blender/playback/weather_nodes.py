@@ -20,12 +20,13 @@ import bpy
 from ...core.weather import weather as w
 from ...core.weather.weather import Matter, Span
 from ...core.weather.weather_places import BOUNDS, COVERED, NEAR, POWERS
-from .. import node_graph
-from ..node_graph import NodeGraph, Number
+from ..nodes import node_graph
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import add_sockets
 from . import weather_table
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import ENDLESS, HOLLOWS, TABLE, CourseNodes
-from .weather_inputs import INPUTS, add_sockets, hold
+from .weather_inputs import INPUTS, hold
 
 WITHIN = "SoftGround Weather Nodes"
 """The group that has the nodes. Of a modifier's own group, Blender notes the values of all sockets at each frame."""
@@ -100,16 +101,16 @@ def build(
     soaking : (float, float)
         Of the hollows; see `core.weather.weather_places.soaking_shares`.
     felt : bool
-        Whether steps felt the weather: how deep they are below new snow is then not what the record has.
+        True if steps felt the weather: how deep they are below new snow is then not what the record has.
     again : bool
-        Whether there are steps into earlier prints.
+        True if there are steps into earlier prints.
     has_water : bool
-        Whether the bake itself has water in prints.
+        True if the bake itself has water in prints.
     """
     inner = within(tree)
     if inner is None:
         inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
-        add_sockets(inner)
+        add_sockets(inner, INPUTS)
     existing = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
     asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
     tables = {name: existing[name] or weather_table.new() for name in asked}
@@ -324,16 +325,15 @@ class _Vertices:
     def _relief(self) -> Number:
         """Height of a vertex over its place at rest [m]."""
         graph, up = self._graph, self._up
-        position = graph.node("GeometryNodeInputPosition").outputs["Position"]
-        moved = graph.vector("SUBTRACT", position, graph.attribute(REST, "FLOAT_VECTOR"))
+        moved = graph.vector("SUBTRACT", graph.position(), graph.attribute(REST, "FLOAT_VECTOR"))
         metre = sum(part * part for part in up)
         return graph.number(graph.dot(moved, tuple(part / metre for part in up)))
 
-    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number, selection: Any = True) -> Any:
+    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number) -> Any:
         """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
         graph, changed = self._graph, geometry
         for name, value in values.items():
-            changed = graph.store(changed, name, value.socket, selection)
+            changed = graph.store(changed, name, value.socket, True)
         return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).socket, geometry, changed)
 
 

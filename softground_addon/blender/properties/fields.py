@@ -9,7 +9,7 @@ from bpy.props import FloatProperty
 
 
 def is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
-    """Return whether an object can be chosen where a mesh is asked for."""
+    """True if an object can be chosen where a mesh is asked for."""
     return candidate.type == "MESH"
 
 

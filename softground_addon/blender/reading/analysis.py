@@ -93,7 +93,7 @@ def look_again() -> None:
 
 
 def is_empty() -> bool:
-    """Return whether no shot is known."""
+    """True if no shot is known."""
     return not state.analyses
 
 
@@ -190,6 +190,21 @@ def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = 
         work = typical_depth.slices(analysis.contacts, *key[1:])
         state.depths[key] = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
     return state.depths[key]
+
+
+def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
+    """Press every contact into the scene's material, where its depth comes from a sample of them."""
+    wanted, uid = settings.snapshot(scene), scene.session_uid
+    analysis = known(scene, wanted)
+    if analysis is None or analysis.terms != _terms(wanted) or analysis.contacts.is_in(*_key(wanted, analysis)[1:]):
+        return
+    work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
+    contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
+    latest: Analysis | None = state.analyses.get(uid)
+    if latest is analysis:
+        state.analyses[uid] = renewed = replace(analysis, contacts=contacts)
+        state.depths.clear()
+        state.depths[_key(wanted, renewed)] = contacts.typical
 
 
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:

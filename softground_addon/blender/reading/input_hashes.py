@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 from .. import mesh_arrays
-from ..animation_layer.animated_paths import animated_paths
 from ..animation_layer.constraint_layer import is_response
+from ..animation_layer.layer_curves import animated_paths
 from ..compat import action_curves, node_inputs, slot_of
 from ..ground import ground_mesh
 

@@ -39,10 +39,9 @@ from ..response.character_keys import ReadRig, controls_of
 from ..reuse import reused
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
-from ..sampling.control_poses import RigPoses
 from ..sampling.prop_extraction import check_props
 from ..sampling.rig_checks import check_rig
-from ..sampling.rig_sampling import sample_character, sample_prop
+from ..sampling.rig_sampling import RigPoses, sample_character, sample_prop
 from ..weather import ground_weather as weather
 from . import ground_frames, hard_ground
 

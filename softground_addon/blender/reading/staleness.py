@@ -21,7 +21,7 @@ from ..ground.baked_ground import display_mesh_of
 from ..ground.still_ground import mover_of
 from ..plants import trampling_table
 from ..playback import playback, weather_modifier
-from ..playback.own_data import FINGERPRINTS
+from ..playback.own_data import BUILD_STAMP
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.worn_rigs import worn_rigs
 from ..sampling.body_sampling import meshes_of
@@ -65,12 +65,12 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
         From `of_movers` and `of_soles`, as they were when they were read.
     """
     stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, inputs["painted"]), **hashes}
-    ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(stamp)
+    ground_mesh.mesh_of(display_mesh_of(ground))[BUILD_STAMP] = json.dumps(stamp)
 
 
 def stamp_of(ground: bpy.types.Object) -> str:
     """Stamp stored with a ground's bake: hashes of its inputs; empty if there is none."""
-    return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(FINGERPRINTS, ""))
+    return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(BUILD_STAMP, ""))
 
 
 def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], soles: Mapping[str, str]) -> None:
@@ -82,7 +82,7 @@ def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], so
         noted: dict[str, str] = json.loads(stamp)
         others = {key: value for key, value in noted.items() if not key.startswith(f"{SOLE}:")}
         renewed = others | dict(soles) | _of_bake(ground, painted)
-        ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(renewed)
+        ground_mesh.mesh_of(display_mesh_of(ground))[BUILD_STAMP] = json.dumps(renewed)
 
 
 def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: BakeSettings) -> tuple[str, ...]:
@@ -108,7 +108,7 @@ def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: 
         text = "'{name}' has lost its playback modifier, and its prints no longer move"
         return (translated(text, name=display_mesh.name),)
     try:
-        then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
+        then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[BUILD_STAMP])
         of_settings = _of_settings(wanted.inputs(Acts.WRITING))
         now = {**of_settings, **_of_bake(ground, wanted.painted), **of_movers(objects, wanted)}
         soles = {key: value for key, value in then.items() if key.startswith(f"{SOLE}:")}
@@ -210,7 +210,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         "gravity_direction": DOWN,
         "under": "AUTO",
     }
-    whole: dict[str, Any] = unsaid | {"gravity_direction": DOWN} | dict(inputs)
+    whole: dict[str, Any] = unsaid | dict(inputs)
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
@@ -291,10 +291,10 @@ def movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
     owner = character.armature or character.body
     owners = [settings.resolve(owner)] if owner else []
     parts = [part for part in _worn_by_body(character) if part not in owners]
-    return [*owners, *parts, *_things_of(character)]
+    return [*owners, *parts, *_props_of(character)]
 
 
-def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
+def _props_of(character: CharacterSettings) -> list[bpy.types.Object]:
     """The objects that print as soles of a character."""
     return [object_named(sole.object) for sole in character.soles if sole.object]
 
@@ -309,14 +309,14 @@ def _worn_by_body(character: CharacterSettings) -> list[bpy.types.Object]:
 
 def bodies_of(objects: settings.Objects, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
-    return [obj for character in wanted.characters for obj in (*_worn_by(objects, character), *_things_of(character))]
+    return [obj for character in wanted.characters for obj in (*_worn_by(objects, character), *_props_of(character))]
 
 
 def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     parts = []
-    for obj in _things_of(character):
+    for obj in _props_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
         parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
     parts += [

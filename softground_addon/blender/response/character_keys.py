@@ -17,8 +17,8 @@ from ...core.numerics.rigid import carried
 from ...core.rig.mapping import RigMapping
 from ...core.settings import ObjectName
 from ..animation_layer.layer_curves import LayerCurve, path_of_bone
-from ..sampling.control_poses import RigPoses
 from ..sampling.rig_checks import check_bones
+from ..sampling.rig_sampling import RigPoses
 from ..settings import resolve
 from .rig_controls import BODY, Control, find_controls
 

@@ -14,8 +14,8 @@ import bpy
 
 from ...core.errors import InputError
 from ...core.rig.mapping import RigMapping
-from ..animation_layer.animated_paths import animated_paths
 from ..animation_layer.constraint_layer import is_own
+from ..animation_layer.layer_curves import animated_paths
 from ..rigs.rig_mapping import CHOOSE_CONTACTS
 
 _FOLLOWED = 0.5

@@ -25,9 +25,8 @@ from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import parts_of
 from ..settings import resolve
 from .rig_checks import check_frames, check_mass
-from .sampling_scene import object_named, sampling_scene, still_there
+from .sampling_scene import depsgraph_at, object_named, sampling_scene
 from .skin_sampling import mesh_of
-from .temporary import handlers_silent
 
 POSES = 24
 """Poses of the whole animation by which parts that move together are found, whatever frames are baked."""
@@ -149,10 +148,7 @@ def _positions(
     counts: list[int] = []
     with sampling_scene(scene, "", (), (), meshes=objects) as temporary:
         for done, frame in enumerate(frames):
-            with handlers_silent():
-                still_there(temporary).frame_set(frame)
-            depsgraph = still_there(temporary).view_layers[0].depsgraph
-            assert depsgraph is not None
+            depsgraph = depsgraph_at(temporary, frame)
             pieces, triangles, first = [], [], 0
             for evaluated in (object_named(obj).evaluated_get(depsgraph) for obj in objects):
                 matrix, mesh = np.array(evaluated.matrix_world), mesh_of(evaluated)

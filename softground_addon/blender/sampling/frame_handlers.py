@@ -1,19 +1,37 @@
-"""Frame handlers of other add-ons and scripts: which of them may move what is read, and their turn to act."""
+"""Frame handlers, put aside while a character is read; those of others that may move it have their turn to act."""
 
 from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
 
 from ...core.findings import Finding
-from .temporary import handlers_silent
 
 _CHANNELS = re.compile("location|rotation|scale|matrix|pose|bone|influence|value|foreach_set|frame_set")
 """What the code names of a handler that moves something."""
+
+
+_SILENT_HANDLERS = ("frame_change_pre", "frame_change_post", "depsgraph_update_pre", "depsgraph_update_post")
+"""Handlers that must not take the temporary scene for a change of the user's frame."""
+
+
+@contextmanager
+def handlers_silent(acting: Sequence[Callable[..., None]] = ()) -> Iterator[None]:
+    """Frame and update handlers put aside, but for those that are `acting`, and put back as they were."""
+    lists: list[Any] = [getattr(bpy.app.handlers, name) for name in _SILENT_HANDLERS]
+    saved = [list(handlers) for handlers in lists]
+    for handlers in lists:
+        handlers[:] = [handler for handler in handlers if handler in acting]
+    try:
+        yield
+    finally:
+        for handlers, functions in zip(lists, saved, strict=True):
+            handlers[:] = functions
 
 
 def moving_handlers() -> list[Callable[..., None]]:

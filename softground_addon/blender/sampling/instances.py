@@ -10,7 +10,7 @@ import bpy
 
 from ...core.findings import Finding, listed
 from ..compat import node_inputs
-from ..node_modifiers import named_by_nodes
+from ..nodes.node_modifiers import named_by_nodes
 
 MOST_LOOKED_AT = 100_000
 """Instances that are looked at (0.3 s)."""

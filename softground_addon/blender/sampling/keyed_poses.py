@@ -26,7 +26,7 @@ _NO_SIMPLE_CHANNEL = re.compile(r'(.*\.)?rotation_mode|delta_.*|pose\.bones\[[^"
 
 
 def is_moved_by_keys_alone(armature: bpy.types.Object, bones: Iterable[str]) -> bool:
-    """Return whether its keys tell all that moves these bones.
+    """True if its keys tell all that moves these bones.
 
     Parents, constraints, drivers, strips and animated properties of the armature's data are left to Blender, and so are
     bones that take over a part of their parent's motion only.
@@ -90,7 +90,7 @@ def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
 
 
 def _plays_its_action_only(animation: bpy.types.AnimData) -> bool:
-    """Return whether no strip of the NLA has a say in what the action does."""
+    """True if no strip of the NLA has a say in what the action does."""
     whole = animation.action_blend_type, animation.action_influence, animation.action_extrapolation
     return (
         all(track.mute and not track.is_solo for track in animation.nla_tracks)

@@ -70,7 +70,7 @@ def check_bones(armature: bpy.types.Object, mapping: RigMapping) -> None:
 
 
 def is_animated(armature: bpy.types.Object) -> bool:
-    """Return whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
+    """True if anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
     obj: bpy.types.Object | None = armature
     while obj is not None:
         animation = obj.animation_data

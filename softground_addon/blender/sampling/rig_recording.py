@@ -17,8 +17,7 @@ from ..placement import world_matrix
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .rig_checks import check_finite
-from .sampling_scene import object_named, sampling_scene, still_there, user_scene
-from .temporary import handlers_silent
+from .sampling_scene import depsgraph_at, object_named, sampling_scene, still_there, user_scene
 
 
 def record(
@@ -134,17 +133,13 @@ def _evaluate(
     source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, props, shapes, handled=handled)
     with source as name:
         for frame in _simulated_before(scene.rigidbody_world, frames.start) if simulated else ():
-            with handlers_silent():
-                still_there(name).frame_set(frame)
+            depsgraph_at(name, frame)
             yield 0
         for done, frame in enumerate(frames):
-            temporary = still_there(name)
             if handled:
-                let_handlers_act(temporary, frame)
-            with handlers_silent(), without_layers(object_named(armature), below) if armature else nullcontext():
-                temporary.frame_set(frame)
-                depsgraph = temporary.view_layers[0].depsgraph
-                assert depsgraph is not None
+                let_handlers_act(still_there(name), frame)
+            with without_layers(object_named(armature), below) if armature else nullcontext():
+                depsgraph = depsgraph_at(name, frame)
                 if armature:
                     evaluated = object_named(armature).evaluated_get(depsgraph)
                     armature_matrices[done] = placed(evaluated)
@@ -175,7 +170,7 @@ def _evaluate(
 
 
 def is_simulated(obj: bpy.types.Object) -> bool:
-    """Return whether Blender's rigid bodies move an object, or one that it is parented to."""
+    """True if Blender's rigid bodies move an object, or one that it is parented to."""
     node: bpy.types.Object | None = obj
     while node is not None:
         if node.rigid_body and node.rigid_body.type == "ACTIVE":
@@ -195,13 +190,9 @@ def _moved_by_handlers(
         for frame in dict.fromkeys((frames[0], frames[len(frames) // 3], frames[-1])):
             seen: list[Any] = []
             for handled in (False, True):
-                temporary = still_there(name)
                 if handled:
-                    let_handlers_act(temporary, frame)
-                with handlers_silent():
-                    temporary.frame_set(frame)
-                depsgraph = temporary.view_layers[0].depsgraph
-                assert depsgraph is not None
+                    let_handlers_act(still_there(name), frame)
+                depsgraph = depsgraph_at(name, frame)
                 at = [object_named(obj).evaluated_get(depsgraph) for obj in objects]
                 poses = (at[0].pose.bones[bone].matrix for bone in bones)
                 seen.append(np.array([*(obj.matrix_world for obj in at), *poses]))

@@ -7,7 +7,7 @@ user's frame, pose and handlers are left alone. Frame handlers of others act in 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -16,6 +16,7 @@ from ...core.carving.responded_skin import WornSkin
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
 from ...core.motion.sole_motion import SoleMotion
+from ...core.numerics.arrays import Array
 from ...core.rig.bones import RigBones
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
@@ -28,7 +29,6 @@ from ..placement import units_about
 from ..reuse import reused
 from ..rigs.rig_mapping import rest_bones
 from ..settings import name_of, resolve
-from .control_poses import RigPoses
 from .prop_extraction import check_props, read_prop
 from .rig_checks import check_frames, check_mass, check_recording, check_rig
 from .rig_recording import record, record_props
@@ -36,6 +36,33 @@ from .skin_sampling import meshes_on, read_skin
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
+
+
+class RigPoses:
+    """Some bones of a rig over time, and the armature in the world; filled while the rig is read.
+
+    Attributes
+    ----------
+    matrices : dict of str to (F, 4, 4) float array
+        Pose of each bone in the armature's frame [Blender units].
+    world : (F, 4, 4) float array
+        Of the armature [Blender units].
+    skin : WornSkin or None
+        What moves with all of its bones, if that is wanted and was read.
+    """
+
+    world: Array
+
+    def __init__(self, bones: Sequence[str], *, with_skin: bool = False) -> None:
+        self.bones, self.with_skin = tuple(bones), with_skin
+        self.skin: WornSkin | None = None
+        self.matrices: dict[str, Array] = {}
+
+    def take(self, recording: Recording) -> None:
+        """Copy the bones from a recording, whose other bones need not stay in memory."""
+        self.world = recording.world
+        for bone in self.bones:
+            self.matrices[bone] = np.swapaxes(recording.poses[:, recording.bones.index(bone)].astype(float), -1, -2)
 
 
 def sample_character(

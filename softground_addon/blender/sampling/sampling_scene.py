@@ -8,11 +8,31 @@ from contextlib import contextmanager
 import bpy
 
 from ...core.errors import InputError
-from .frame_handlers import let_handlers_act
-from .temporary import TEMPORARY, handlers_silent, temporary_scene
+from ..compat import remove_scene
+from .frame_handlers import handlers_silent, let_handlers_act
+
+TEMPORARY = "SoftGround Sampling"
+"""Name of what exists only while a rig is read."""
+
+IS_TEMPORARY = "softground_is_temporary"
+"""Property of the scenes in which rigs are read, by which those that were left over are told from the user's."""
 
 _SCENE_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 """Render settings that decide which time a frame number means."""
+
+
+@contextmanager
+def temporary_scene() -> Iterator[bpy.types.Scene]:
+    """A new scene, marked as ours and gone afterwards, unless an undo or a new file has taken it away before."""
+    scene = bpy.data.scenes.new(TEMPORARY)
+    name = scene.name
+    scene[IS_TEMPORARY] = True
+    try:
+        yield scene
+    finally:
+        if (remaining := bpy.data.scenes.get(name)) is not None:
+            with handlers_silent():
+                remove_scene(remaining)
 
 
 @contextmanager
@@ -81,6 +101,16 @@ def still_there(name: str) -> bpy.types.Scene:
     if scene is None:
         raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
     return scene
+
+
+def depsgraph_at(name: str, frame: int) -> bpy.types.Depsgraph:
+    """What the scene of that name evaluates to at a frame; raises as `still_there` does."""
+    scene = still_there(name)
+    with handlers_silent():
+        scene.frame_set(frame)
+    depsgraph = scene.view_layers[0].depsgraph
+    assert depsgraph is not None
+    return depsgraph
 
 
 def object_named(name: str) -> bpy.types.Object:

@@ -12,9 +12,10 @@ import numpy as np
 
 from ...core.rig.rig_skin import Shape
 from .. import mesh_arrays
-from ..animation_layer.animated_paths import animated_paths
+from ..animation_layer.layer_curves import animated_paths
 from ..settings import ObjectName, find, name_of
-from .temporary import handlers_silent, temporary_scene
+from .frame_handlers import handlers_silent
+from .sampling_scene import temporary_scene
 
 _MOST_FACES = 100_000
 """Faces up to which a surface is subdivided."""

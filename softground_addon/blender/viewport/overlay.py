@@ -15,8 +15,9 @@ from ...core.errors import InputError
 from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import jobs, session, settings
+from ..ground import baked_steps
 from ..live import live
-from ..operators import baked_steps, prediction
+from ..operators import prediction
 from ..operators.modal_job import Reading, ReadingShot
 from ..placement import in_scene
 from ..reading import analysis

@@ -18,9 +18,8 @@ from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
 from ..baking import step_edits
 from ..baking.step_preview import StepPreview
-from ..ground import baked_ground
-from ..operators import baked_steps
-from ..operators.baked_steps import BakedStep
+from ..ground import baked_ground, baked_steps
+from ..ground.baked_steps import BakedStep
 from ..placement import from_scene, in_scene
 from ..state import state
 from ..translation import translated

@@ -28,11 +28,11 @@ from ...core.record.edits import (
 from ...core.record.mesh_sole import MeshSole
 from .. import jobs, session, settings
 from ..baking import step_edits, step_soles
-from ..ground import baked_ground
+from ..ground import baked_ground, baked_steps
+from ..ground.baked_steps import BakedStep
 from ..live import live
 from ..operator_base import OnBake
-from ..operators import baked_steps, show_prints
-from ..operators.baked_steps import BakedStep
+from ..operators import show_prints
 from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..placement import from_scene
 from ..reading import analysis
@@ -44,7 +44,7 @@ class OnSteps(OnBake):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a bake, and neither another one nor live mode is at work."""
+        """True if there is a bake, and neither another one nor live mode is at work."""
         if session.current().is_baking or live.is_on():
             cls.poll_message_set(
                 translated("A bake is running, or live mode is on: wait, or press Keep or Discard first")

@@ -51,7 +51,7 @@ At = Callable[[int, Array, Array, Array], Weathered]
 
 
 def has_weather(display_mesh: bpy.types.Object) -> bool:
-    """Return whether weather is shown on a ground that carries a bake."""
+    """True if weather is shown on a ground that carries a bake."""
     modifier = weather_modifier.modifier_of(display_mesh)
     return modifier is not None and modifier.show_viewport
 

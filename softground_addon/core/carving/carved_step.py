@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..ground.deep_ground import wading
 from ..numerics.arrays import Array, Indices, Mask
 from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder
+from ..soles.deep_ground import wading
 from .carver import Walls
 
 POSES_ALONG_SOLE = 9

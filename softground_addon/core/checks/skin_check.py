@@ -1,4 +1,4 @@
-"""A bake judged by the skin: where it rests, ground and prints must be."""
+"""Check of a bake by the skin: ground and prints must be where skin rests."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
 
 OFF_SKIN = 0.012
-"""The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
+"""Largest distance of the ground from resting skin, in body heights: 2 cm for an adult, the compliance of a shoe."""
 NEAR = 0.015
-"""Calm skin this near to where it rests touches, in body heights (`skin.bearing.TOUCH`)."""
+"""Height over the resting skin up to which calm skin touches, in body heights (`skin.bearing.TOUCH`)."""
 BESIDE = 0.15
-"""A step within this of touching skin is that skin's, in body heights: a foot's length."""
+"""Distance from touching skin within which a step is made by it, in body heights: a foot's length."""
 DISAGREE = 0.15
-"""Share of steps, and of moments of rest, that may go without the other: brushes, and the ends of contacts."""
+"""Share of steps without skin, and of frames of rest without a step, that is no fault: brushes, ends of contacts."""
 LEAST_REST = 3
-"""Frames of rest without a step that may be the rounding of a contact's ends."""
+"""Frames of rest without a step that are no fault: the ends of contacts are rounded."""
 BIN = 0.004
 """Step of the levels that are tried, in body heights (`skin.ground_level.BIN`)."""
 STANDING_PERCENTILE = 20.0
 """Percentile of the lowest skin that is on the ground: a walker has a foot there nearly always."""
-SOME_FRAMES = 200
+FRAMES_AT_ONCE = 200
 """Frames whose skin is looked up on the ground in one go."""
 
 
@@ -43,34 +43,34 @@ def skin_check(
 ) -> Slices[list[Finding]]:
     """Findings where ground, steps and resting skin disagree."""
     motion = character.motion
-    beyond, soft = beyond_edge(motion, terrain), bare(terrain)
+    extended, soft = beyond_edge(motion, terrain), bare(terrain)  # with the ground continued, and without hard objects
     height, has_ground = np.empty(skin.rise.shape), np.empty(skin.rise.shape, dtype=bool)
-    for start in range(0, len(height), SOME_FRAMES):
-        now = slice(start, start + SOME_FRAMES)
+    for start in range(0, len(height), FRAMES_AT_ONCE):
+        now = slice(start, start + FRAMES_AT_ONCE)
         x, y, z = np.moveaxis(skin.position[now], -1, 0)
-        height[now] = z - up_to(beyond, z + LEAVE_HEIGHT * motion.leg_length).heights(x, y)
+        height[now] = z - up_to(extended, z + LEAVE_HEIGHT * motion.leg_length).heights(x, y)
         has_ground[now] = np.isfinite(soft.heights(x, y))
         yield
     height[~np.isfinite(height)] = np.inf
-    over = _resting(height, skin)
-    if over is None:
+    resting_height = _resting(height, skin)
+    if resting_height is None:
         return []
     findings: list[Finding] = []
-    if abs(over) > OFF_SKIN * skin.height:
-        if level := level_on_slope(character, steps, terrain, ground, abs(over)):
+    if abs(resting_height) > OFF_SKIN * skin.height:
+        if level := level_on_slope(character, steps, terrain, ground, abs(resting_height)):
             return level
-        side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
+        side, ground_way, body_way = ("above", "up", "down") if resting_height > 0 else ("below", "down", "up")
         findings.append(
             Finding(
                 "ground_off_skin",
                 "error",
-                f"The skin of '{motion.name}' rests {abs(over) * 100:.1f} cm {side} '{ground}'",
+                f"The skin of '{motion.name}' rests {abs(resting_height) * 100:.1f} cm {side} '{ground}'",
                 f"move the ground {ground_way} by as much, or the character {body_way}.",
             )
         )
     else:
-        over = 0.0  # what presses is the ground itself, and the feet may rest a little apart
-    rise = (height - over) / skin.height
+        resting_height = 0.0  # what presses is the ground itself, and the feet may rest a little apart
+    rise = (height - resting_height) / skin.height
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
@@ -80,7 +80,10 @@ def skin_check(
 def level_on_slope(
     character: CharacterLoads, steps: Sequence[Footprint], terrain: Terrain, ground: str, off: float
 ) -> list[Finding]:
-    """Soles that lie level on ground that slopes, where they are `off` it [m], or without a skin may be."""
+    """Finding that soles lie level on ground that slopes; none where the slope explains less than a distance `off` [m].
+
+    `off` is that of the resting skin from the ground, or 0 without a skin.
+    """
     motion, contacts = character.motion, character.contacts
     if not _stands_level(motion, steps, terrain, off):
         return []
@@ -96,7 +99,7 @@ def level_on_slope(
 
 
 def _stands_level(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:
-    """Return whether soles lie level on ground that slopes, so that no move of it mends that skin is `off` it [m]."""
+    """True if soles lie level on ground that slopes by more than `off` [m] under them: moving it then mends nothing."""
     soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
     spans = [np.zeros((0, 2))]
     for step in steps:
@@ -117,12 +120,12 @@ class _Touching:
 
     skin: LowSkin
     on: Mask
-    """Which parts are where they rest on the ground, (F, P)."""
+    """True for parts (F, P) that rest on the ground."""
     down: Mask
-    """The same, also beyond its edge, and of parts that have sunk into it: some of their skin is at its level."""
+    """The same, with parts beyond its edge and those that have sunk into it, whose skin is partly at its level."""
 
     def near(self, step: Footprint, frames: slice, reach: float) -> Mask:
-        """At which of some frames skin touches within reach of a step."""
+        """True for those of the frames (N,) at which skin touches within reach of a step [m]."""
         apart = np.linalg.norm(self.skin.position[frames, :, :2] - step.position[:2], axis=-1)
         calm = self.skin.rise[frames] < self.skin.calm
         return np.asarray((self.down[frames] & calm & (apart < reach)).any(axis=1))
@@ -155,7 +158,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
     frames, height = touching.skin.frames, touching.skin.height
     soles = {sole.sole.name: sole for sole in motion.soles}
     covered = np.zeros(len(frames), dtype=bool)
-    seen, alone = 0, []
+    checked, without_skin = 0, []
     for step in steps:
         yield
         sole = soles[step.sole]
@@ -164,17 +167,17 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
         covered[first:last] |= touching.near(step, slice(first, last), reach)
         if sole.bears is not None:
             middle = step.middle(frames)
-            seen += 1
+            checked += 1
             if not touching.near(step, slice(middle, middle + 1), reach).any():
-                alone.append(step.start_frame)
+                without_skin.append(step.start_frame)
     findings = []
-    if len(alone) > DISAGREE * seen:
+    if len(without_skin) > DISAGREE * checked:
         findings.append(
             Finding(
                 "step_without_skin",
                 "error",
-                f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
-                "on",
+                f"{len(without_skin)} of {checked} steps of '{motion.name}' print where no skin rests, from frame "
+                f"{without_skin[0]:.0f} on",
                 "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
             )
         )

@@ -21,6 +21,7 @@ from ..imprints.sole_points import SolePoints, sole_points
 from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
+from ..pressing.edited_contacts import edited_contact
 from ..pressing.ground_cells import GroundCells, UndisturbedCells
 from ..pressing.open_contact import OpenContact
 from ..pressing.prop_layout import PropLayout
@@ -30,7 +31,6 @@ from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from ..record.footprints import Footprint
 from ..record.mesh_sole import MeshSole
 from ..record.record import BakeRecord
-from .edited_contacts import edited_contact
 from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
 
 Change = tuple[int, StepEdit]
@@ -206,7 +206,7 @@ class EditedSteps:
         return [n for n in np.flatnonzero(near).tolist() if self._reads(n, None, cells)]
 
     def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
-        """Return whether a step, as it was baked or as it is now, presses some cells."""
+        """True if a step, as it was baked or as it is now, presses some cells."""
         prints = (self._before(number), footprint)
         return any(
             bool(among(cells, pressed).any())
@@ -350,7 +350,7 @@ def _within(changes: frozenset[Change], edits: Mapping[int, StepEdit]) -> bool:
 
 
 def _at_once(footprint: Footprint | None, other: Footprint | None) -> bool:
-    """Return whether two prints were made at the same time."""
+    """True if two prints were made at the same time."""
     if footprint is None or other is None:
         return False
     return abs(footprint.start_frame - other.start_frame) + abs(footprint.end_frame - other.end_frame) < _SAME_TIME

@@ -97,6 +97,10 @@ class ShotContacts:
     sample: list[int]
     beneath: list[int]
 
+    def is_in(self, material: GroundMaterial, pressure: Pressure) -> bool:
+        """True if they were pressed into this material by this pressure."""
+        return (self.ground.material, self.ground.pressure) == (material, pressure)
+
 
 @sliced
 def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Slices[ShotContacts]:

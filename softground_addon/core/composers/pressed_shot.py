@@ -10,7 +10,6 @@ import numpy as np
 from ..checks.volumes import check_volumes
 from ..errors import InputError
 from ..findings import Finding
-from ..ground.deep_ground import wading
 from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
@@ -22,6 +21,7 @@ from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
 from ..settings import TIME_LIMIT, BakeSettings
+from ..soles.deep_ground import wading
 from .edited_steps import with_edits
 from .prediction import pressed_contacts
 from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on

@@ -71,7 +71,7 @@ def _two_feet(character: Mapping[str, Any]) -> set[str]:
 
 
 def _is_bare(sole: Sole, *, pattern: str) -> bool:
-    """Return whether it is a paw, a hoof, or a foot with toes apart, to which the pattern of a bare foot may belong."""
+    """True if it is a paw, a hoof, or a foot with toes apart, to which the pattern of a bare foot may belong."""
     if sole.prop is not None:
         return False
     return sole.length < PAW * sole.breadth or (pattern != FLESH and _toes_apart(sole.outline) > APART)
@@ -93,7 +93,7 @@ def _toes_apart(outline: Array) -> float:
 
 
 def _is_upright(on_feet: Sequence[Footprint], on_limbs: Sequence[Footprint]) -> bool:
-    """Return whether contacts of feet pass without those of other limbs."""
+    """True if contacts of feet pass without those of other limbs."""
     if not on_feet or not on_limbs:
         return True
     of_feet, of_limbs = (

@@ -102,7 +102,7 @@ def leaning(
 
 
 def leans_anew(now: Leaning, before: Leaning | None) -> bool:
-    """Return whether a lean differs so much from the one that pressed the ground that the forces must be found anew."""
+    """True if a lean differs so much from the one that pressed the ground that the forces must be found anew."""
     then = before.leans if before is not None else [np.zeros(2)] * len(now.leans)
     return any(float(np.abs(lean - was).max()) > NOTICEABLE_LEAN for lean, was in zip(now.leans, then, strict=True))
 

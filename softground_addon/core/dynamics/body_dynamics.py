@@ -345,7 +345,7 @@ def flights(airborne: Mask, body: BodyDynamics, motion: CharacterMotion) -> Mask
 
 
 def _walks_over(motion: CharacterMotion, first: NDArray[np.intp], last: NDArray[np.intp]) -> Mask:
-    """Return whether the body moves on from step `first` to `last` (I,) while a point of a sole hardly does, (I,)."""
+    """True if the body moves on from step `first` to `last` (I,) while a point of a sole hardly does, (I,)."""
     if not len(first):
         return np.zeros(0, dtype=bool)
     hips = motion.hips

@@ -216,7 +216,7 @@ def fitted_to_free_fall(
     independent : float
         Share of the M steps that tell something new: low-passed accelerations change slowly.
     whole : bool
-        Whether all of the body moves as its joints do, as it also does where nothing shows the legs.
+        True if all of the body moves as its joints do, as it also does where nothing shows the legs.
 
     Returns
     -------

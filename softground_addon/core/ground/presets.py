@@ -51,7 +51,7 @@ class Preset:
     cells_along_sole : float, optional
         Cells that lie along the shortest sole.
     debris : bool, optional
-        Whether steps throw what physics says.
+        True if steps throw what physics says.
     section : str, optional
         One of `SECTIONS`.
 

@@ -56,7 +56,7 @@ class Window(NamedTuple):
         return first * cell_size, (first + size) * cell_size
 
     def holds(self, row: Indices, column: Indices) -> Mask:
-        """Return whether cells lie within the window."""
+        """True if cells lie within the window."""
         right, down = column - self.column, row - self.row
         return (right >= 0) & (right < self.columns) & (down >= 0) & (down < self.rows)
 
@@ -80,7 +80,7 @@ class Window(NamedTuple):
         return Window(column, row, columns, rows) if columns > 0 and rows > 0 else None
 
     def intersects(self, other: Window) -> bool:
-        """Return whether the two share a cell."""
+        """True if the two share a cell."""
         return self.intersection(other) is not None
 
     def refined(self, factor: int) -> Window:

@@ -177,7 +177,7 @@ class MeshTerrain:
         return near[((place.min(axis=1) <= high) & (place.max(axis=1) >= low)).all(axis=1)]
 
     def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Return whether no second upward-facing surface lies below the highest one, for each place."""
+        """True if no second upward-facing surface lies below the highest one, for each place."""
         across, along = np.ravel(x), np.ravel(y)
         top = self.heights(across, along)
         single = np.ones(np.size(x), dtype=bool)

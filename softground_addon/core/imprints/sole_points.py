@@ -206,7 +206,7 @@ def _posed(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
 
 
 def has_steps(ground: Surface, jump: float) -> bool:
-    """Return whether neighbouring cells of the ground differ in height by more than a jump [m]."""
+    """True if neighbouring cells of the ground differ in height by more than a jump [m]."""
     heights = np.where(ground.bears, ground.heights, np.nan)
     with np.errstate(invalid="ignore"):
         return (

@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole, SoleMotion, SolePatch
 from ..numerics.arrays import Array, Mask
@@ -16,6 +15,7 @@ from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import fitted_slope, smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation
+from ..soles.deep_ground import wading
 from .wading import depth_of_contacts, dragged, ploughed
 
 ANKLE_PITCH = np.radians(25.0)

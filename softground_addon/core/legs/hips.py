@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..ground.deep_ground import wading
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Array, Mask
 from ..numerics.plane_fit import smoothed
+from ..soles.deep_ground import wading
 from .foot_placement import Placement
 from .wading import DEPTH_TIME, body_depth, depth_of_contacts
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..ground.deep_ground import wading
 from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import smooth_step
 from ..numerics.intervals import runs
 from ..numerics.plane_fit import smoothed
+from ..soles.deep_ground import wading
 
 DEPTH_TIME = 0.4
 """Standard deviation of the smoothing of the sinkage that the body responds to [s], for an adult."""

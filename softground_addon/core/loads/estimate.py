@@ -1,4 +1,9 @@
-"""Estimate of loads from a character's motion: contacts and forces on the simulation's time grid."""
+"""Estimate of loads from a character's motion: contacts and forces on the simulation's time grid.
+
+One of four ways, by what is known: a motion that jumps is estimated part by part; a body that is a prop (`centre`)
+falls freely between its contacts; landings alone shape the forces where the user wants it or joints are missing; else
+the whole body's dynamics do.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +78,7 @@ def estimate_loads(
         return CharacterLoads(
             *free_loads(motion, terrain, steps=steps, characteristic_time=tau, force_model=force_model)
         )
-    source, given = continued(without_holds(motion))
+    source, shot = continued(without_holds(motion))
     source = source.resampled(steps)
     yield
     ground = beyond_edge(source, terrain)
@@ -84,12 +89,12 @@ def estimate_loads(
     else:
         body = body_dynamics(source, ~contacts.touching.any(axis=1))
         yield
-        # A cycle on the spot is acted: its skin tells better when it touches than the forces that would move it so.
+        # Of a body that walks on the spot, the dynamics tell less about its contacts than its skin does.
         if source.ground_level is None or treadmill_speed(source, contacts) == 0:
             contacts = refine_contacts(source, contacts, body)
         yield
         forces = whole_body_forces(source, contacts, body)
     if ground is not terrain or isinstance(terrain, HardOnSoft):
         contacts, forces = without_missing(source, terrain, contacts, forces)
-    shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
+    shown = slice(shot.start * steps, (shot.stop - 1) * steps + 1)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))

@@ -1,7 +1,8 @@
-"""A contact across borders of the ground: each cell takes its share of what each kind of ground alone would do.
+"""Contacts across the borders of regions.
 
-The law of no kind is asked about what is none of its own: a cell in the middle of a region is pressed as if the whole
-ground were like it, and between two regions the compression goes over from the one's to the other's.
+Each kind of ground presses the whole contact as if there were no other; every cell then takes the mean of these
+results, weighted by the share of each kind in it (`Regions.under`). Inside a region that is its own kind alone, and
+over the width of a border the compression passes from one kind to the other.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from ..numerics.arrays import Array
 from .ground_cells import Imprints
 
 INCOMPRESSIBLE = 0.5
-"""Poisson's ratio of ground all of which rises that is compressed; in each cell a factor takes off what does not."""
+"""Poisson's ratio with which all compressed volume rises; `Factors.rim` then reduces it in each cell."""
 HALF = 0.5
-"""Share of a cell from which on its crust holds."""
+"""Share of kinds with a holding crust from which on the crust of a cell holds."""
 
 
 def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
-    """Sum of the values of each kind, (N,) or (N, rows, columns), times their shares (K, rows, columns)."""
+    """Mean of the values of K kinds, (N,) or (N, rows, columns) each, weighted by shares (K, rows, columns)."""
     total = np.zeros(1)
     for value, share in zip(values, shares, strict=True):
         total = total + share * (value if value.ndim > 1 else value[:, None, None])
@@ -31,7 +32,7 @@ def in_shares(values: Sequence[NDArray[np.floating]], shares: Array) -> Array:
 
 
 def across(of_kinds: Sequence[Imprints], shares: Array) -> tuple[Imprints, int]:
-    """Compression of cells where each kind of ground has a share in them.
+    """Imprints of one contact in ground of several kinds.
 
     Parameters
     ----------
@@ -45,21 +46,21 @@ def across(of_kinds: Sequence[Imprints], shares: Array) -> tuple[Imprints, int]:
     imprints : Imprints
         With the contact, the rim and the loads of the kind that bears most.
     most : int
-        Which that is: it has most of the area of contact.
+        Number of that kind: the one with the largest part of the area of contact.
     """
     areas = [float((share * each.coverage).sum()) for each, share in zip(of_kinds, shares, strict=True)]
-    laid = of_kinds[most := int(np.argmax(areas))]
-    raised = sum(share * 2.0 * each.material.poisson_ratio for each, share in zip(of_kinds, shares, strict=True))
-    even = laid.factors or Factors(*np.ones((3, *shares.shape[1:])))
+    main = of_kinds[most := int(np.argmax(areas))]
+    rising_share = sum(share * 2.0 * each.material.poisson_ratio for each, share in zip(of_kinds, shares, strict=True))
+    factors = main.factors or Factors(*np.ones((3, *shares.shape[1:])))
     held = [np.zeros(1) if each.holds is None else each.holds.astype(float) for each in of_kinds]
     imprints = replace(
-        laid,
+        main,
         coverage=in_shares([each.coverage for each in of_kinds], shares).astype(np.float32),
         pressing=np.any([each.pressing for each in of_kinds], axis=0),
         target=in_shares([each.target for each in of_kinds], shares),
         rate=in_shares([each.rate for each in of_kinds], shares),
         holds=in_shares(held, shares) > HALF if any(each.holds is not None for each in of_kinds) else None,
-        factors=Factors(even.stiffness, even.depth, np.asarray(even.rim * raised)),
-        material=replace(laid.material, poisson_ratio=INCOMPRESSIBLE),
+        factors=Factors(factors.stiffness, factors.depth, np.asarray(factors.rim * rising_share)),
+        material=replace(main.material, poisson_ratio=INCOMPRESSIBLE),
     )
     return imprints, most

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.deep_ground import wading
 from ..imprints.sole_points import SolePoints
 from ..numerics.arrays import Array
+from ..soles.deep_ground import wading
 
 Pressure = NDArray[np.floating[Any]]
 

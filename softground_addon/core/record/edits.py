@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError
@@ -68,7 +68,6 @@ class StepEdit:
 
 
 UNCHANGED = StepEdit()
-_FIELDS = tuple(field.name for field in fields(StepEdit) if field.name != "mesh")
 
 
 def step_id(footprint: Footprint, copy: int = 0) -> str:
@@ -95,7 +94,7 @@ def with_edit(
         Its id, or that of the copy: edits stored under ids of an earlier bake go.
     """
     _, _, copy = _parts(name)
-    others = {other: stored for other, stored in edits.items() if not _is_of(_parts(other), footprint, copy)}
+    others = {other: stored for other, stored in edits.items() if not _is_of(other, footprint, copy)}
     return others if edit is None else others | {name: edit}
 
 
@@ -107,7 +106,7 @@ def new_copy(edits: Mapping[str, StepEdit], footprint: Footprint) -> str:
     InputError
         If it has `MOST_COPIES` already.
     """
-    taken = {copy for name in edits for copy in [_parts(name)[2]] if _is_of(_parts(name), footprint, copy)}
+    taken = {_parts(name)[2] for name in edits if _is_of(name, footprint, _parts(name)[2])}
     free = next((copy for copy in range(1, MOST_COPIES + 1) if copy not in taken), None)
     if free is None:
         raise InputError(
@@ -190,33 +189,38 @@ def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> di
     """Ids of the edits that belong to steps, by number; of several for one step, the one nearest to its middle."""
     of_soles: dict[str, dict[int, dict[float, str]]] = {}
     for name in edits:
-        who, frame, copy = _parts(name)
-        of_soles.setdefault(who, {}).setdefault(copy, {})[frame] = name
+        sole, frame, copy = _parts(name)
+        of_soles.setdefault(sole, {}).setdefault(copy, {})[frame] = name
     names = {}
     for number, footprint in enumerate(footprints) if edits else ():
         middle = _middle(footprint)
         for copy, frames in of_soles.get(sole_id(footprint), {}).items():
-            meant = [f for f in frames if footprint.start_frame <= f <= footprint.end_frame or f == middle]
-            if meant:
-                nearest = min(meant, key=lambda frame: abs(frame - middle))
+            during = [frame for frame in frames if _is_during(frame, footprint)]
+            if during:
+                nearest = min(during, key=lambda frame: abs(frame - middle))
                 names[number + copy * len(footprints)] = frames[nearest]
     return names
 
 
-def _is_of(parts: tuple[str, float, int], footprint: Footprint, copy: int) -> bool:
-    who, frame, number = parts
-    during = footprint.start_frame <= frame <= footprint.end_frame or frame == _middle(footprint)
-    return (who, number) == (sole_id(footprint), copy) and during
+def _is_of(name: str, footprint: Footprint, copy: int) -> bool:
+    """True if an id is that of a step, or of its copy of that number."""
+    sole, frame, number = _parts(name)
+    return (sole, number) == (sole_id(footprint), copy) and _is_during(frame, footprint)
+
+
+def _is_during(frame: float, footprint: Footprint) -> bool:
+    """True if the frame of an id is within a contact; that of a short one may round to a frame beside it."""
+    return footprint.start_frame <= frame <= footprint.end_frame or frame == _middle(footprint)
 
 
 def _parts(name: str) -> tuple[str, float, int]:
-    """Character and sole, frame, and number of the copy in an id; ValueError where it is none."""
-    who, _, when = name.rpartition("@")
+    """Name of the sole as of `sole_id`, frame, and number of the copy in an id; ValueError where it is none."""
+    sole, _, when = name.rpartition("@")
     frame, plus, copy = when.partition("+")
     number = int(copy) if plus else 0
-    if "/" not in who or not math.isfinite(float(frame)) or not (not plus or 1 <= number <= MOST_COPIES):
+    if "/" not in sole or not math.isfinite(float(frame)) or not (not plus or 1 <= number <= MOST_COPIES):
         raise ValueError(name)
-    return who, float(frame), number
+    return sole, float(frame), number
 
 
 def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
@@ -245,7 +249,7 @@ def edit_as_json(edit: StepEdit) -> dict[str, Any]:
     """
     return {
         key: list(value) if isinstance(value, tuple) else value
-        for key in _FIELDS
+        for key in _CHECKS
         if (value := getattr(edit, key)) != getattr(UNCHANGED, key)
     }
 
@@ -289,11 +293,11 @@ def _edit(name: str, change: object, origin: str) -> StepEdit:
         raise InputError(f"{where}: this is not the id of a step. The bake's report names them: steps, id.") from None
     if not isinstance(change, dict):
         raise InputError(f'{where} must be a table such as {{"mute": true}}.')
-    _check_fields(change, _FIELDS, where)
-    for field, (is_valid, needed) in _VALID.items():
+    _check_fields(change, tuple(_CHECKS), where)
+    for field, (is_valid, needed, _) in _CHECKS.items():
         if field in change and not is_valid(change[field]):
             raise InputError(f"{where}: '{field}' is {change[field]!r}; it must be {needed}.")
-    return StepEdit(**{field: _KINDS[field](value) for field, value in change.items()})
+    return StepEdit(**{field: _CHECKS[field][2](value) for field, value in change.items()})
 
 
 def _is_number(value: object, low: float, high: float) -> bool:
@@ -313,31 +317,28 @@ def _is_sole(value: object) -> bool:
         return False
 
 
-_VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "mute": (lambda value: isinstance(value, bool), "true or false"),
-    "strength": (lambda value: _is_number(value, 0.0, STRONGEST), f"a number from 0 to {STRONGEST:g}"),
-    "move_m": (_is_move, f"two numbers up to {FARTHEST:g} m, along x and y"),
-    "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360"),
-    "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}"),
-    "sole": (
-        _is_sole,
-        f"a foot of the bake, such as 'Fox/paw.L', or a mesh object, in at most {LONGEST_NAME} bytes",
+_CHECKS: dict[str, tuple[Callable[[Any], bool], str, Callable[[Any], Any]]] = {
+    "mute": (lambda value: isinstance(value, bool), "true or false", bool),
+    "strength": (lambda value: _is_number(value, 0.0, STRONGEST), f"a number from 0 to {STRONGEST:g}", float),
+    "move_m": (
+        _is_move,
+        f"two numbers up to {FARTHEST:g} m, along x and y",
+        lambda move: (float(move[0]), float(move[1])),
     ),
+    "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360", float),
+    "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}", float),
     "shift_frames": (
         lambda value: _is_number(value, -LONGEST_SHIFT, LONGEST_SHIFT) and value == int(value),
         f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
+        int,
+    ),
+    "sole": (
+        _is_sole,
+        f"a foot of the bake, such as 'Fox/paw.L', or a mesh object, in at most {LONGEST_NAME} bytes",
+        str,
     ),
 }
-"""Checks of the fields of an edit, and their words in messages."""
-_KINDS: dict[str, Callable[[Any], Any]] = {
-    "mute": bool,
-    "strength": float,
-    "move_m": lambda move: (float(move[0]), float(move[1])),
-    "turn_deg": float,
-    "scale": float,
-    "shift_frames": int,
-    "sole": str,
-}
+"""Check of each field of an edit in JSON, its words in messages, and the type that it is stored as."""
 
 
 def sole_id(footprint: Footprint) -> str:

@@ -92,7 +92,7 @@ class Footprint:
     contact_start, contact_end : (C,) float arrays
         First and last scene frame at which it touched each of them.
     pressed_by : ContactSteps or None
-        Movement of the sole, to press it again elsewhere; None of a print that was itself edited, and of old records.
+        Movement of the sole, to press it again elsewhere; None of a print that was itself edited.
     surface : str
         What bears most of it (see `ground.surfaces`), where the ground has regions; else empty.
     """
@@ -224,12 +224,12 @@ class FootprintRecorder:
         if rest.any():
             self.add(frame, window, rest, touched)
 
-    def footprint(self, **what: Any) -> Footprint:
+    def footprint(self, **other_fields: Any) -> Footprint:
         """The footprint so far.
 
         Parameters
         ----------
-        **what
+        **other_fields
             All other fields of `Footprint`: names, times, place and load.
         """
         union = self.window
@@ -248,7 +248,7 @@ class FootprintRecorder:
             contact_cells=cells,
             contact_start=when[first_touch],
             contact_end=when[last_touch],
-            **what,
+            **other_fields,
         )
 
     def _combined(self, channel: list[Any], frames: Array, union: Window) -> Changes:

@@ -24,7 +24,7 @@ class _Print:
     change: NDArray[np.float32]  # (K + 1, cells), 0 at first
 
 
-KEPT = 256
+PRINTS_REMEMBERED = 256
 """Footprints that are kept laid out over time, which takes as much memory again as they do."""
 
 
@@ -44,7 +44,7 @@ class GroundHistory:
         self._cell_size = footprints[0].cell_size if footprints else 1.0
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
         self._starts = np.array([footprint.start_frame for footprint in footprints])
-        self._print = lru_cache(KEPT)(lambda number: _series(footprints[number]))
+        self._print = lru_cache(PRINTS_REMEMBERED)(lambda number: _series(footprints[number]))
 
     def heights(self, x: Array, y: Array, frame: Array) -> Array:
         """Heights at places and frames, arrays of one shape [m]; NaN where there is no ground."""

@@ -102,7 +102,7 @@ class Amounts:
 
 
 @cache
-def of_look(look: str, folder: Path = FOLDER) -> Amounts:
+def of_look(look: str) -> Amounts:
     """The amounts of a look.
 
     Raises
@@ -110,7 +110,7 @@ def of_look(look: str, folder: Path = FOLDER) -> Amounts:
     InputError
         If there is no table of it, or it holds something else.
     """
-    path = folder / f"{surfaces.find(look).relief}.json"
+    path = FOLDER / f"{surfaces.find(look).relief}.json"
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

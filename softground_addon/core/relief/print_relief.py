@@ -31,7 +31,7 @@ MEAN_TREAD = 0.3
 FLESH, ARCH = 0.7, 0.018
 """Height of a bare foot's ridges over the depth of its print, and the most of it [m]: its arch comes down into deep
 prints as well."""
-MANY = 1500
+CELLS_FOR_VOLUME = 1500
 """Cells of a print from which its volume is the sum over their centres alone, whatever finer detail is shown."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
@@ -98,7 +98,7 @@ class PrintRelief:
         self._wider, self._deeper, self._level, self._part = 0.0, 0.0, -np.inf, 1.0
         self.crumbs: list[ScatteredCrumbs] = []
         x, y = shape.moved(shape.cell_size)
-        if len(x) < MANY:
+        if len(x) < CELLS_FOR_VOLUME:
             x, y = shape.moved(finest)
         places = self._look_up(x, y)
         self._wider = self._widening(places)

@@ -7,12 +7,12 @@ from math import floor
 
 import numpy as np
 
-from ..ground.deep_ground import wading
 from ..legs.grounding import leg_soles
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Mask
 from ..numerics.intervals import runs
 from ..record.footprints import Footprint
+from ..soles.deep_ground import wading
 
 LEAVE_TIME = 0.15
 """Time before its toe-off at which a foot starts to leave a deep print [s], for an adult, if another one stands."""

@@ -26,7 +26,7 @@ class SoleSource:
     object : str
         Name of an object that prints with its own mesh instead; empty if a bone does.
     limb : bool
-        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
+        True if the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
     parts : tuple of str
         The bones whose skin it is, where the skin has shown them; empty for the bone, its toes and what hangs on them.
     """

@@ -54,7 +54,7 @@ def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recordi
 
 
 def _turns(recording: Recording, bone: str, bears: NDArray[np.bool_]) -> bool:
-    """Return whether a bone bears in attitudes that differ much."""
+    """True if a bone bears in attitudes that differ much."""
     axes = unit(np.swapaxes(recording.bone(bone)[bears, :3, :3], -1, -2)[..., 2])
     usual = unit(np.median(axes, axis=0))
     return bool((axes @ usual < np.cos(np.radians(TURNED))).mean() > TURNED_SHARE)

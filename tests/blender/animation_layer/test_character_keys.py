@@ -351,15 +351,15 @@ def test_slowing_down_stretches_time_and_the_response_still_fits(scene):
     assert gaps.max() < 5.0
 
 
-@pytest.mark.parametrize("own", [(100, 100), (100, 200), (1, 2), (200, 100), (1, 12), (900, 1)])
-def test_slowing_down_keeps_the_users_own_time_and_is_the_same_twice(scene, own):
+@pytest.mark.parametrize("mapping", [(100, 100), (100, 200), (1, 2), (200, 100), (1, 12), (900, 1)])
+def test_slowing_down_keeps_the_users_own_time_and_is_the_same_twice(scene, mapping):
     set_up(shots.walker(scene))
     render = scene.render
-    render.frame_map_old, render.frame_map_new = own
+    render.frame_map_old, render.frame_map_new = mapping
     for _ in range(2):
         settings.slow_down(scene, 0.8)
         slowed = render.frame_map_new / render.frame_map_old
-        assert slowed == pytest.approx(own[1] / own[0] / 0.8, rel=0.01, abs=0.01)
+        assert slowed == pytest.approx(mapping[1] / mapping[0] / 0.8, rel=0.01, abs=0.01)
     render.frame_map_old, render.frame_map_new = 100, 50  # the user's hand again
     settings.slow_down(scene, 0.5)
     assert render.frame_map_new / render.frame_map_old == pytest.approx(1.0)

@@ -319,20 +319,20 @@ def posed_as(armature, mode):
 def test_made_keys_show_what_the_layers_showed_and_keep_the_users_action(scene, walker, mode):
     if mode != "QUATERNION":
         posed_as(walker, mode)
-    own = walker.animation_data.action
-    before = fingerprints.of_action(own)
+    action = walker.animation_data.action
+    before = fingerprints.of_action(action)
     bpy.ops.softground.bake()
     poses = shown(scene, walker)
     assert bpy.ops.softground.make_keys() == {"FINISHED"}
     assert shown(scene, walker) == pytest.approx(poses, abs=1.5e-3)
     assert not any(bone.constraints for bone in walker.pose.bones)
     assert LayerKind.RESPONSE.value not in bpy.data.objects
-    assert walker.animation_data.action != own
-    assert own.use_fake_user
-    assert fingerprints.of_action(own)[:2] == before[:2]
+    assert walker.animation_data.action != action
+    assert action.use_fake_user
+    assert fingerprints.of_action(action)[:2] == before[:2]
     assert bake_report.stale_reasons(scene) == (), "feet stand in the prints, now by keys"
     result = responders.bake(scene)
-    assert "response_in_keys" in {found["code"] for found in result.report["self_check"]}
+    assert "response_in_keys" in {finding["code"] for finding in result.report["self_check"]}
 
 
 def test_made_keys_of_ik_controls_and_of_the_object_that_travels(scene):
@@ -355,8 +355,12 @@ def test_bones_that_keys_cannot_pose_keep_their_layer(scene, walker):
     poses = shown(scene, walker)
     bpy.ops.softground.make_keys()
     assert shown(scene, walker) == pytest.approx(poses, abs=1.5e-3)
-    own = {bone.name: [one.name for one in bone.constraints] for bone in walker.pose.bones if bone.constraints}
-    assert own == {"foot.L": [limit.name, LayerKind.RESPONSE.value]}
+    constraints = {
+        bone.name: [constraint.name for constraint in bone.constraints]
+        for bone in walker.pose.bones
+        if bone.constraints
+    }
+    assert constraints == {"foot.L": [limit.name, LayerKind.RESPONSE.value]}
 
 
 @pytest.mark.parametrize("trouble", ["nothing", "tweak mode", "solo"])

@@ -420,13 +420,13 @@ def test_what_is_known_of_every_step_is_let_go_before_the_ground_is_written(walk
     def alive():
         return [thing for thing in gc.get_objects() if isinstance(thing, CharacterLoads)]
 
-    others, kept = alive(), []  # of other tests
+    others, alive_after = alive(), []  # of other tests
     write = baked_ground.write
 
     def watched(*given, **options):
-        kept.extend(loads for loads in alive() if not any(loads is other for other in others))
+        alive_after.extend(loads for loads in alive() if not any(loads is other for other in others))
         return write(*given, **options)
 
     monkeypatch.setattr(baked_ground, "write", watched)
     bake(walk)
-    assert len(kept) == 0
+    assert len(alive_after) == 0

@@ -74,7 +74,7 @@ CHANGES = {
 }
 
 
-def left(scene):
+def record_in(scene):
     """All that a bake leaves in the file, byte by byte, and its report, but for names and the time that it took."""
     report = bake(scene).report
     meshes = {mesh.name: fingerprints.of_mesh(mesh) for mesh in bpy.data.meshes}
@@ -91,9 +91,9 @@ def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, cha
     scene = opened_as(baked_walk)
     for name, value in changes:
         CHANGES[name](scene, value)
-        as_it_comes = left(scene)
+        as_it_comes = record_in(scene)
         reuse.forget()
-        assert left(scene) == as_it_comes, name
+        assert record_in(scene) == as_it_comes, name
 
 
 def anew(scene, change=lambda: None):
@@ -162,7 +162,7 @@ def test_landings_follow_the_time_that_the_ground_needs(again, value):
     again.softground.characters[0].force_model = "IMPULSE"
     bake(again)
     assert "loads" in anew(again, lambda: setattr(again.softground.material, "characteristic_time", value))
-    assert left(again) == (reuse.forget(), left(again))[1]
+    assert record_in(again) == (reuse.forget(), record_in(again))[1]
 
 
 def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):

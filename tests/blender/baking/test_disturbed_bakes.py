@@ -287,7 +287,9 @@ def test_a_character_that_was_deleted_in_the_viewport_prints_no_more(scene, bake
     other = shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()
     bpy.ops.softground.bake()
-    assert [other.name] == [one.armature.name for one in scene.softground.characters if one.armature.users_collection]
+    assert [other.name] == [
+        character.armature.name for character in scene.softground.characters if character.armature.users_collection
+    ]
 
 
 def test_a_fine_copy_that_was_deleted_in_the_viewport_does_not_live_on_after_clear(scene):

@@ -65,7 +65,7 @@ def test_a_modifier_lasts_no_longer_than_its_own_range(scene, walker):
 
 def test_curves_that_go_straight_on_last_as_long_as_the_scene_and_level_ones_do_not(scene, walker):
     walker.keyframe_insert("delta_location", index=1, frame=10)
-    curve = next(one for one in curves_of(walker) if one.data_path == "delta_location")
+    curve = next(each for each in curves_of(walker) if each.data_path == "delta_location")
     walker.delta_location.y = 1.0
     walker.keyframe_insert("delta_location", index=1, frame=20)
     curve.extrapolation = "LINEAR"

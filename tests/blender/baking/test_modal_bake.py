@@ -228,7 +228,7 @@ def test_a_bake_whose_draft_is_purged_says_so(scene):
 
 
 def works_after(bake, seconds):
-    """Whether a tick works that comes some time after the last one [s]."""
+    """True if a tick works that comes some time after the last one [s]."""
     before = bake.worked
     bake._ticked = time.perf_counter() - seconds
     modal_job.ModalJob._tick(bake)
@@ -286,16 +286,16 @@ def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
     prepare(scene, "created")
     result = jobs.run(bake_job.bake(scene, write=False))
     first = min(step["frame_start"] for step in result.report["steps"])
-    told = []
-    operator = SimpleNamespace(report=lambda _kind, text: told.append(text), _is_first=False)
+    reports = []
+    operator = SimpleNamespace(report=lambda _kind, text: reports.append(text), _is_first=False)
     for frame in (int(first) - 1, int(first) + 1):
         scene.frame_set(frame)
         modal_bake.SOFTGROUND_OT_bake._show(operator, result)
-    assert [text.endswith(". Press Play to see them") for text in told if "steps" in text] == [True, False]
+    assert [text.endswith(". Press Play to see them") for text in reports if "steps" in text] == [True, False]
 
 
 def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):
-    """Whether a bake lets an event through to a sidebar that shows a tab."""
+    """True if a bake lets an event through to a sidebar that shows a tab."""
     region = SimpleNamespace(type="UI", x=0, y=0, width=100, height=100, active_panel_category=tab)
     screen = SimpleNamespace(areas=[SimpleNamespace(type="VIEW_3D", regions=[region])])
     event = SimpleNamespace(type=kind, mouse_x=place[0], mouse_y=place[1], ctrl=ctrl)

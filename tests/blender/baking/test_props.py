@@ -45,9 +45,9 @@ def bake(scene, **values):
 
 def heights(scene):
     mesh = scene.softground.ground.data
-    found = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", found)
-    return found
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", positions)
+    return positions
 
 
 def test_a_dropped_ball_bakes_from_one_click(scene):
@@ -151,11 +151,11 @@ def test_a_wheel_that_rolls_leaves_one_continuous_rut(scene):
 
 
 def test_two_things_make_the_same_ground_in_either_order(scene):
-    one, other = ball("One", location=(0, 0, 0)), ball("Other", 0.15, location=(2, 0, 0))
-    key_path(one, dropped_path(0.0, 0.0, 1.0))
+    first, other = ball("One", location=(0, 0, 0)), ball("Other", 0.15, location=(2, 0, 0))
+    key_path(first, dropped_path(0.0, 0.0, 1.0))
     key_path(other, dropped_path(2.0, 0.3, 2.0, radius=0.15))
     grounds = []
-    for order in ([one, other], [other, one]):
+    for order in ([first, other], [other, first]):
         scene.softground.characters.clear()
         scene.softground.ground = None
         add_props(scene, order)

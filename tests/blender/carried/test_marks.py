@@ -8,10 +8,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers
+from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import exports
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.surfaces import CARRIED_KINDS
@@ -132,8 +133,8 @@ def test_they_play_without_the_add_on(scene, baked):
         "    print('count', f, len(o.evaluated_get(graph).data.vertices))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    found = {int(f): int(n) for f, n in re.findall(r"count (\d+) (\d+)", done.stdout)}
-    assert found == {frame: len(at(scene, frame).vertices) for frame in (84, 1, 60)}
+    counts = {int(f): int(n) for f, n in re.findall(r"count (\d+) (\d+)", done.stdout)}
+    assert counts == {frame: len(at(scene, frame).vertices) for frame in (84, 1, 60)}
 
 
 def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
@@ -187,7 +188,7 @@ def test_a_bake_that_leaves_none_takes_older_ones_away(scene, change):
 
 def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(opened_as):
     scene = opened_as(over_a_muddy_crate)
-    found = {}
+    covered = {}
     for marks, hard in ((True, True), (False, True), (True, False), (False, False)):
         if not hard:
             scene.softground.hard_grounds.clear()
@@ -197,15 +198,15 @@ def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(ope
         ground = scene.softground.ground
         inputs = dict(result.report["inputs"])
         assert inputs.pop("marks", True) == marks
-        found[marks, hard] = (
+        covered[marks, hard] = (
             record.dump(record.BakeRecord(list(result.footprints), {})),
             heights(ground).tobytes(),
             {key: value for key, value in result.report["totals"].items() if key != "carried_kg"},
             inputs,
         )
         assert (marks_object.of(ground) is not None) == (marks and hard)
-    assert found[True, True] == found[False, True]
-    assert found[True, False] == found[False, False]
+    assert covered[True, True] == covered[False, True]
+    assert covered[True, False] == covered[False, False]
 
 
 def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
@@ -324,8 +325,8 @@ def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, s
     write(ground, path, 58, 84)
     known = set(bpy.data.objects)
     read(str(path))
-    found = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]
-    assert len(found) == 1
+    marks = [obj for obj in set(bpy.data.objects) - known if obj.type == "MESH" and "Marks" in obj.name]
+    assert len(marks) == 1
     for frame, count in counts.items():
         scene.frame_set(frame)
-        assert len(shown(found[0]).vertices) == count
+        assert len(shown(marks[0]).vertices) == count

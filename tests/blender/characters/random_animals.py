@@ -48,7 +48,7 @@ class Animal:
     names : str
         Which bones tell what they are.
     tail, rolls, on_the_spot, carried : bool
-        Whether it has a tail, its heels rise before its toes, it stays where it is, its object travels.
+        True if it has a tail, its heels rise before its toes, it stays where it is, its object travels.
     turn : float
         Its heading [rad].
     level : float
@@ -56,12 +56,12 @@ class Animal:
     offset : float
         Phase between the pairs of legs.
     idle : bool
-        Whether it stands where it is and moves its trunk alone.
+        True if it stands where it is and moves its trunk alone.
     skates, trembles, floats : float
         Share of its stride by which a standing foot slides, how far its feet tremble, and by how much the first of them
         stands higher than the others.
     toes, arms, grazes, fine : bool
-        Whether its feet have toes, it has arms or holds its head low, and its skin has more vertices than corners.
+        True if its feet have toes, it has arms or holds its head low, and its skin has more vertices than corners.
     seed : int
     """
 
@@ -255,9 +255,9 @@ def _add_trunk(animal: Animal, model: _Model) -> None:
         model.box(f"Arm.{side}", (x - 0.04, -0.04, 1.1), (x + 0.04, 0.04, 1.6))
         model.box(f"Hand.{side}", (x - 0.03, -0.04, 0.85), (x + 0.03, 0.04, 1.1))
     ends = [(0.0, (0.15 if animal.legs == 2 else 0.7) + 0.3 * n, 1.1 - 0.15 * n) for n in range(4)]
-    for number, (here, there) in enumerate(pairwise(ends) if animal.tail else ()):
-        model.bone(f"Tail{number}", here, there, f"Tail{number - 1}" if number else "Pelvis")
-        low, high = np.minimum(here, there) - 0.03, np.maximum(here, there) + 0.03
+    for number, (here, end) in enumerate(pairwise(ends) if animal.tail else ()):
+        model.bone(f"Tail{number}", here, end, f"Tail{number - 1}" if number else "Pelvis")
+        low, high = np.minimum(here, end) - 0.03, np.maximum(here, end) + 0.03
         model.box(f"Tail{number}", tuple(low), tuple(high))
 
 
@@ -343,7 +343,7 @@ def _keys(animal: Animal, armature: bpy.types.Object, legs: list[_Leg], size: fl
             armature.keyframe_insert("location", frame=frame + 1)
         if animal.tail:
             wag = Matrix.Rotation(0.2 * np.sin(2 * np.pi * frame / animal.rate / animal.period), 4, "Z")
-            _pose(armature, "Tail1", wag, frame, own=True)
+            _pose(armature, "Tail1", wag, frame, in_own_axes=True)
 
 
 def _key_foot(animal: Animal, armature: bpy.types.Object, number: int, leg: _Leg, size: float) -> None:
@@ -361,11 +361,13 @@ def _key_foot(animal: Animal, armature: bpy.types.Object, number: int, leg: _Leg
             _pose(armature, bone, still if is_bare else shift @ roll, frame)
 
 
-def _pose(armature: bpy.types.Object, bone: str, displacement: Matrix, frame: int, *, own: bool = False) -> None:
+def _pose(
+    armature: bpy.types.Object, bone: str, displacement: Matrix, frame: int, *, in_own_axes: bool = False
+) -> None:
     """Keys that displace a bone in the armature's space, or turn it in its `own`."""
     posed = armature.pose.bones[bone]
     rest = posed.bone.matrix_local
     posed.rotation_mode = "QUATERNION"
-    posed.matrix_basis = displacement if own else rest.inverted() @ displacement @ rest
+    posed.matrix_basis = displacement if in_own_axes else rest.inverted() @ displacement @ rest
     posed.keyframe_insert("location", frame=frame + 1)
     posed.keyframe_insert("rotation_quaternion", frame=frame + 1)

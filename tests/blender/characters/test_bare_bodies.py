@@ -134,7 +134,7 @@ def test_parts_that_are_no_figure_are_refused_with_the_reason(scene, change, rea
 def test_the_command_line_sets_up_the_only_body_of_a_scene_without_a_rig(scene):
     robot(scene, frames=30)
     set_up_automatically(scene)
-    assert [one.name for one in scene.softground.characters] == ["Robot"]
+    assert [character.name for character in scene.softground.characters] == ["Robot"]
 
 
 def test_a_body_that_lost_a_part_says_what_to_do(scene):
@@ -170,10 +170,10 @@ def test_a_body_of_shape_keys_walks_as_the_rig_that_it_came_from(scene):
     assert character.body == body
     assert character.skin_mass == pytest.approx(mass, rel=0.05)
     character.mass = mass
-    own = analysis.read(scene)
-    (theirs,), (ours,) = twin.loads, own.loads
+    of_parts = analysis.read(scene)
+    (theirs,), (ours,) = twin.loads, of_parts.loads
     assert len(ours.motion.soles) == len(theirs.motion.soles) == 2
     weight = mass * 9.81
     total = ours.forces.forces[..., 2].sum(axis=1), theirs.forces.forces[..., 2].sum(axis=1)
     assert np.abs(total[0] - total[1]).mean() < 0.02 * weight
-    assert own.contacts.typical == pytest.approx(twin.contacts.typical, rel=0.05)
+    assert of_parts.contacts.typical == pytest.approx(twin.contacts.typical, rel=0.05)

@@ -45,10 +45,10 @@ def poses() -> dict[tuple[str, int], np.ndarray]:
     body = np.zeros((FRAMES, 3))
     body[:, 1] = -STRIDE * np.arange(FRAMES) / PERIOD
     sideways, ahead = np.array([1.0, 0, 0]), np.array([0.0, -1.0, 0.16]) / np.hypot(1, 0.16)
-    found, at = {}, np.add(body, (0, 0, 0.47))
+    places, at = {}, np.add(body, (0, 0, 0.47))
     for part, (head, tail) in rigs.TRUNK.items():
         end = at + ahead * (tail[2] - head[2])
-        found[part, 0] = along(at, end, sideways)
+        places[part, 0] = along(at, end, sideways)
         at = end
     for side in (0, 1):
         mirror = np.array([1 - 2 * side, 1, 1])
@@ -68,8 +68,8 @@ def poses() -> dict[tuple[str, int], np.ndarray]:
             "toe": (instep, toes),
         }
         up = np.array([0.0, 0.0, 1.0])
-        found |= {(part, side): along(*ends, up if part == "collar" else sideways) for part, ends in joints.items()}
-    return found
+        places |= {(part, side): along(*ends, up if part == "collar" else sideways) for part, ends in joints.items()}
+    return places
 
 
 def tube(length: float, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -93,8 +93,8 @@ def crawler(family: rigs.Family) -> bpy.types.Object:
         above, above_rest = (placed[bone.parent.name], rest[bone.parent.name]) if bone.parent else (still, np.eye(4))
         basis = np.linalg.inv(above @ np.linalg.inv(above_rest) @ rest[name]) @ matrix
         pose.rotation_mode = "QUATERNION"
-        for frame, one in enumerate(basis):
-            pose.matrix_basis = one.T.tolist()
+        for frame, in_bone in enumerate(basis):
+            pose.matrix_basis = in_bone.T.tolist()
             pose.keyframe_insert("location", frame=frame + 1)
             pose.keyframe_insert("rotation_quaternion", frame=frame + 1)
         bar, sides = tube(bone.length, 0.04 if "hand" in name.lower() else THICK)
@@ -108,7 +108,7 @@ def crawler(family: rigs.Family) -> bpy.types.Object:
     skin.parent = armature
     skin.modifiers.new("Armature", "ARMATURE").object = armature
     for name in placed:
-        skin.vertex_groups.new(name=name).add([n for n, own in enumerate(owners) if own == name], 1.0, "REPLACE")
+        skin.vertex_groups.new(name=name).add([n for n, owner in enumerate(owners) if owner == name], 1.0, "REPLACE")
     return armature
 
 

@@ -70,9 +70,9 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     report = bake(scene).report
     assert not codes(report) & {"unit_scale", "mass_of_size"}
     assert len(report["steps"]) == len(steps)
-    for one, other in zip(report["steps"], steps, strict=True):
-        assert one["position"] == pytest.approx(other["position"], abs=0.02)
-        assert one["max_depth_m"] == pytest.approx(other["max_depth_m"], rel=0.1)
+    for step, other in zip(report["steps"], steps, strict=True):
+        assert step["position"] == pytest.approx(other["position"], abs=0.02)
+        assert step["max_depth_m"] == pytest.approx(other["max_depth_m"], rel=0.1)
     with pytest.raises(RuntimeError, match="its scale needs no fix"):
         bpy.ops.softground.fix_scale()
     bpy.data.objects.remove(armature.parent)
@@ -107,8 +107,8 @@ def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
     report = bake(scene).report
     assert "walks_in_place" not in codes(report)
     assert len(report["steps"]) == len(steps)
-    for one, other in zip(report["steps"], steps, strict=True):
-        assert one["position"][:2] == pytest.approx(other["position"][:2], abs=0.12)
+    for ours, other in zip(report["steps"], steps, strict=True):
+        assert ours["position"][:2] == pytest.approx(other["position"][:2], abs=0.12)
     assert belt.parent.name == "Walker Travel"
 
 
@@ -122,7 +122,7 @@ def test_the_button_works_that_a_warning_names_of_a_rig_that_was_scaled_after_it
     armature.scale = (scale,) * 3
     bpy.context.view_layer.update()
     scene.softground.cell_size = 0.02 * scale
-    (finding,) = (one for one in bake(scene).report["self_check"] if one["code"] == "unit_scale")
+    (finding,) = (each for each in bake(scene).report["self_check"] if each["code"] == "unit_scale")
     bpy.ops.softground.fix_scale()
     factor = armature.parent.scale.x
     assert finding["remedy"].startswith(f"Press Scale by {factor:g}, or leave it")
@@ -137,7 +137,7 @@ def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names
     armature.scale = (0.42 / stature_of(scene.unit_settings.scale_length, armature),) * 3
     bpy.context.view_layer.update()
     scene.softground.cell_size = 0.01
-    (finding,) = (one for one in bake(scene).report["self_check"] if one["code"] == "unit_scale")
+    (finding,) = (each for each in bake(scene).report["self_check"] if each["code"] == "unit_scale")
     assert "is 42 cm tall: its file is in another unit." in finding["message"]
     assert finding["remedy"].startswith("Press Scale by 4,")
     bpy.ops.softground.clear_bake()

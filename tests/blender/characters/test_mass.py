@@ -103,7 +103,7 @@ def test_the_panel_suggests_the_mass_where_the_field_differs_much(scene):
 def test_a_mass_that_does_not_suit_the_body_is_pointed_out(short_walk):
     character = short_walk.softground.characters[0]
     character.mass = 10 * character.skin_mass
-    (finding,) = [one for one in bake(short_walk).report["self_check"] if one["code"] == "mass_of_size"]
+    (finding,) = [each for each in bake(short_walk).report["self_check"] if each["code"] == "mass_of_size"]
     assert f"the volume of its skin suggests about {character.skin_mass:g} kg" in finding["message"]
 
 
@@ -112,7 +112,7 @@ def test_a_body_scaled_after_it_was_added_is_weighed_at_its_new_size(short_walk)
     character.armature.scale = (0.1, 0.1, 0.1)
     bpy.context.view_layer.update()
     short_walk.softground.cell_size = 0.002
-    (finding,) = [one for one in bake(short_walk).report["self_check"] if one["code"] == "mass_of_size"]
+    (finding,) = [each for each in bake(short_walk).report["self_check"] if each["code"] == "mass_of_size"]
     assert f"about {character.skin_mass / 1000:.2g} kg" in finding["message"]
 
 

@@ -60,9 +60,9 @@ def misses(animal: Animal) -> list[str]:
     ],
 )
 def test_every_foot_of_a_random_animal_prints_when_it_stands(addon, first, count, right):
-    wrong = {seed: found for seed in range(first, first + count) if (found := misses(Animal.drawn(seed)))}
+    wrong = {seed: faults for seed in range(first, first + count) if (faults := misses(Animal.drawn(seed)))}
     assert len(wrong) <= (1 - right) * count, wrong
-    assert not [seed for seed, found in wrong.items() if any("GROSS" in miss for miss in found)], wrong
+    assert not [seed for seed, faults in wrong.items() if any("GROSS" in miss for miss in faults)], wrong
 
 
 @pytest.mark.parametrize(("size", "period"), [(0.12, 0.57), (7.4, 2.1), (1.0, 3.0)])

@@ -75,7 +75,7 @@ def test_the_skin_that_is_read_is_the_skin_that_is_seen(scene, body, shape):
     shape(body)
     armature, before = body.parent, {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "scenes")}
     skin = read_skin(scene.objects, armature)
-    shapes = [one.key for one in skin.shapes]
+    shapes = [shape.key for shape in skin.shapes]
     recording = list_of(record(scene, armature, range(1, 21), skin.bones, units_of(scene), shapes=shapes))
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
     read = skinned(skin, rest_bones(armature), recording, np.arange(len(skin.vertices)))

@@ -50,7 +50,7 @@ def begin(*arguments, **how):
 
 def results(folder):
     """What the bakes of a folder gave, as bytes: every mesh, the records, and the reports without their timings."""
-    found = {}
+    hashes = {}
     for path in sorted(folder.glob("*.blend")):
         bpy.ops.wm.open_mainfile(filepath=str(path))
         meshes = {mesh.name: fingerprints.of_mesh(mesh) | {"properties": None} for mesh in bpy.data.meshes}
@@ -58,8 +58,8 @@ def results(folder):
         assert len(records) == 1
         report = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         del report["timings"]
-        found[path.stem] = hashlib.sha256(repr((meshes, records, report)).encode()).hexdigest()
-    return found
+        hashes[path.stem] = hashlib.sha256(repr((meshes, records, report)).encode()).hexdigest()
+    return hashes
 
 
 @pytest.mark.slow

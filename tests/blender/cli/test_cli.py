@@ -50,9 +50,9 @@ def test_the_bpy_module_runs_the_same_command(shot, tmp_path):
     done = command_line.run("bake", shot, "--report", report)
     assert done.returncode == 0, done.stderr
     assert "steps, deepest" in done.stdout
-    there = json.loads(report.read_text(encoding="utf-8"))
-    assert here["steps"] == there["steps"]
-    assert here["input_hash"] == there["input_hash"]
+    written = json.loads(report.read_text(encoding="utf-8"))
+    assert here["steps"] == written["steps"]
+    assert here["input_hash"] == written["input_hash"]
 
 
 def test_options_reach_the_bake(shot, tmp_path):
@@ -113,9 +113,9 @@ def test_a_dry_run_saves_nothing(shot, tmp_path):
 def test_help_names_formats_as_they_are_written(capsys):
     with pytest.raises(SystemExit):
         cli_arguments.parse(["export", "--help"], standalone=True)
-    told = capsys.readouterr().out
-    assert "events-json" in told
-    assert "EVENTS_JSON" not in told
+    printed = capsys.readouterr().out
+    assert "events-json" in printed
+    assert "EVENTS_JSON" not in printed
     assert (
         cli_arguments.parse(["export", "a.blend", "--format", "EVENTS_JSON"], standalone=True).format == "events-json"
     )
@@ -262,9 +262,9 @@ def test_what_would_take_for_ever_is_refused_with_what_it_would_take(shot, capfd
     monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 6e9)
     started = time.perf_counter()
     assert run(shot, *options) == 2
-    told = capfd.readouterr().err
-    assert says in told
-    assert "Traceback" not in told
+    printed = capfd.readouterr().err
+    assert says in printed
+    assert "Traceback" not in printed
     assert time.perf_counter() - started < 60
 
 

@@ -68,9 +68,9 @@ def test_a_bake_is_the_same_wherever_the_shot_is(short_walk, where, parented):
     moved(scene, WHERE[where])
     now = bake(scene).footprints
     assert len(now) == len(before) == 3
-    for here, there in zip(now, before, strict=True):
-        assert here.position == pytest.approx(there.position, abs=1e-5)
-        assert here.max_depth_m == pytest.approx(there.max_depth_m, abs=1e-5)
+    for here, then in zip(now, before, strict=True):
+        assert here.position == pytest.approx(then.position, abs=1e-5)
+        assert here.max_depth_m == pytest.approx(then.max_depth_m, abs=1e-5)
     assert bake_report.stale_reasons(scene) == ()
 
 
@@ -104,8 +104,8 @@ def test_steps_events_and_what_is_thrown_are_told_where_they_are_in_the_world(sh
     now = bake(short_walk)
     bpy.context.view_layer.update()
     for table in ("steps", "events"):
-        for here, there in zip(now.report[table], before.report[table], strict=True):
-            assert here["position"] == pytest.approx(wall @ Vector(there["position"]), abs=2e-5)
+        for here, then in zip(now.report[table], before.report[table], strict=True):
+            assert here["position"] == pytest.approx(wall @ Vector(then["position"]), abs=2e-5)
     assert baked_ground.events_of(ground)[0]["normal"] == pytest.approx(wall @ Vector((0, 0, 1)), abs=1e-4)
     pieces = debris_object.of(ground)
     assert (pieces.matrix_world @ Vector(pieces.data.vertices[0].co))[:] == pytest.approx((wall @ middle)[:], abs=1e-4)
@@ -162,8 +162,8 @@ def test_prints_on_a_deck_that_is_still_or_sails_evenly_are_those_without_a_deck
         ship.keyframe_insert("location", frame=frame)
     short_walk.frame_set(1)
     now = bake(short_walk).footprints
-    for here, there in zip(now, before, strict=True):
-        of_both = ((*step.position, step.max_depth_m, step.compressed_m3) for step in (here, there))
+    for here, then in zip(now, before, strict=True):
+        of_both = ((*step.position, step.max_depth_m, step.compressed_m3) for step in (here, then))
         assert next(of_both) == (next(of_both) if keyed is still else pytest.approx(next(of_both), rel=1e-6, abs=1e-7))
     assert bake_report.stale_reasons(short_walk) == ()
     short_walk.frame_set(20)
@@ -191,9 +191,9 @@ def test_a_lift_that_speeds_up_presses_prints_deeper(short_walk):
     deck(short_walk, keyed=rising)
     now = bake(short_walk).report["events"]
     added = 2 / 9.81
-    for here, there in zip(now, before, strict=True):
-        if there["peak_bw"] > 1.0 and there["phase"] == "foot_flat":
-            assert here["peak_bw"] == pytest.approx(there["peak_bw"] + added, abs=0.02)
+    for here, then in zip(now, before, strict=True):
+        if then["peak_bw"] > 1.0 and then["phase"] == "foot_flat":
+            assert here["peak_bw"] == pytest.approx(then["peak_bw"] + added, abs=0.02)
 
 
 def test_steps_on_a_crate_that_rides_along_stand_on_it(short_walk):
@@ -270,9 +270,9 @@ def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
     edited = jobs.run(step_edits.reading(short_walk))
     name = edited.record.steps[1].name
     jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
-    left = baked_ground.record_of(short_walk.softground.ground).edited
-    assert len(left) == len(result.footprints)
-    moves = [new.position - old.position for new, old in zip(left, result.footprints, strict=True)]
+    prints = baked_ground.record_of(short_walk.softground.ground).edited
+    assert len(prints) == len(result.footprints)
+    moves = [new.position - old.position for new, old in zip(prints, result.footprints, strict=True)]
     assert moves[1] == pytest.approx((0.1, 0, 0), abs=0.02)
     assert moves[0] == pytest.approx((0, 0, 0))
 

@@ -58,7 +58,7 @@ def test_a_material_of_the_user_s_stays_until_the_look_is_asked_for(short_walk, 
 
     bpy.ops.softground.load_preset(name="Soil")
     assert surfaces(ground) == ["soil over"]
-    assert [one.name for one in bpy.data.materials if one.get(MARK) == "mud over"] == []
+    assert [material.name for material in bpy.data.materials if material.get(MARK) == "mud over"] == []
     bpy.ops.softground.bake()
     assert surfaces(ground) == ["soil over"]
     bpy.ops.softground.clear_bake()

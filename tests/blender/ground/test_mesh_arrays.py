@@ -43,7 +43,7 @@ def mesh_of(kinds, seed=1):
 def as_blender_says(mesh):
     mesh.calc_loop_triangles()
     triangles = mesh.loop_triangles
-    return [tuple(one.loops) for one in triangles], [one.polygon_index for one in triangles]
+    return [tuple(triangle.loops) for triangle in triangles], [triangle.polygon_index for triangle in triangles]
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_triangles_are_blender_s_own(scene, kinds):
     faces = mesh_arrays.read_faces(mesh)
     corners = mesh_arrays.triangle_corners(faces)
     assert (list(map(tuple, corners.tolist())), faces.triangle_face.tolist()) == as_blender_says(mesh)
-    vertices = np.array([tuple(one.vertices) for one in mesh.loop_triangles])
+    vertices = np.array([tuple(triangle.vertices) for triangle in mesh.loop_triangles])
     assert (mesh_arrays.triangles(mesh) == vertices).all()
 
 

@@ -18,13 +18,13 @@ def lift_by_scene_time(ground, _scene):
         inner.nodes.new(kind)
         for kind in ("GeometryNodeSetPosition", "GeometryNodeInputSceneTime", "ShaderNodeCombineXYZ")
     )
-    for one, other in (
+    for source, target in (
         (inner_given, place.inputs["Geometry"]),
         (time.outputs["Seconds"], up.inputs["Z"]),
         (up.outputs[0], place.inputs["Offset"]),
         (place.outputs[0], inner_result),
     ):
-        inner.links.new(one, other)
+        inner.links.new(source, target)
     nested = tree.nodes.new("GeometryNodeGroup")
     nested.node_tree = inner
     tree.links.new(given, nested.inputs[0])
@@ -55,7 +55,7 @@ def test_a_ground_that_anything_shapes_over_time_is_told_of_and_up_to_date_at_ev
     assert bpy.ops.softground.bake() == {"FINISHED"}
     # Where the ground is lifted, the skin's distance from it is said too.
     changes = "'Field' changes its shape over time by its modifier 'Theirs'"
-    (_,) = (one for one in ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if changes in one)
+    (_,) = (warning for warning in ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if changes in warning)
     for frame in (1, 20):
         short_walk.frame_set(frame)
         assert bake_report.stale_reasons(short_walk) == ()

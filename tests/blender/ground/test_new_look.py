@@ -20,13 +20,13 @@ def test_a_look_added_by_one_record_is_baked_thrown_heard_weathered_and_exported
     command = [sys.executable, "-m", "tests.blender.new_look_worker", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    found = json.loads((tmp_path / "found.json").read_text())
-    assert (found["label"], found["material"]) == ("Volcanic Ash", "SoftGround Volcanic Ash")
-    assert found["pieces"] == [pytest.approx([*RECORD.colour, 1.0])]
-    assert found["debris"] > 100
-    thrown = sum(row["thrown_kg"] for row in found["events"])
-    assert thrown == pytest.approx(found["thrown_m3"] * RECORD.density, rel=1e-3)
-    assert "SoftGround Weather" in found["modifiers"]
+    facts = json.loads((tmp_path / "found.json").read_text())
+    assert (facts["label"], facts["material"]) == ("Volcanic Ash", "SoftGround Volcanic Ash")
+    assert facts["pieces"] == [pytest.approx([*RECORD.colour, 1.0])]
+    assert facts["debris"] > 100
+    thrown = sum(row["thrown_kg"] for row in facts["events"])
+    assert thrown == pytest.approx(facts["thrown_m3"] * RECORD.density, rel=1e-3)
+    assert "SoftGround Weather" in facts["modifiers"]
     notes = {note for note in range(128) if bytes((0x90, note)) in (tmp_path / "steps.mid").read_bytes()}
     assert notes == {RECORD.midi_note, RECORD.midi_note + 1}
     assert max((tmp_path / "steps.wav").read_bytes()[44:]) > 0

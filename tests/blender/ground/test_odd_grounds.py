@@ -64,7 +64,7 @@ def scatter_by_nodes(ground):
     points.inputs["Density"].default_value = 1.0
     stones = tree.nodes.new("GeometryNodeInstanceOnPoints")
     both = tree.nodes.new("GeometryNodeJoinGeometry")
-    for one, other in (
+    for source, target in (
         (given, points.inputs["Mesh"]),
         (points.outputs["Points"], stones.inputs["Points"]),
         (stone.outputs["Geometry"], stones.inputs["Instance"]),
@@ -72,7 +72,7 @@ def scatter_by_nodes(ground):
         (stones.outputs["Instances"], both.inputs[0]),
         (both.outputs[0], result),
     ):
-        tree.links.new(one, other)
+        tree.links.new(source, target)
     ground.modifiers.new("Scatter", "NODES").node_group = tree
 
 
@@ -84,13 +84,13 @@ def scatter_by_particles(ground):
 
 
 def shown(thing):
-    """Whether an object's own mesh is in the viewport, and how many instances are on it."""
+    """True if an object's own mesh is in the viewport, and how many instances are on it."""
     mesh, instances = False, 0
-    for one in bpy.context.evaluated_depsgraph_get().object_instances:
-        if one.is_instance:
-            instances += one.parent.original == thing
-        elif one.object.original == thing:
-            mesh = one.show_self
+    for instance in bpy.context.evaluated_depsgraph_get().object_instances:
+        if instance.is_instance:
+            instances += instance.parent.original == thing
+        elif instance.object.original == thing:
+            mesh = instance.show_self
     return mesh, instances
 
 

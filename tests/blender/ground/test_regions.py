@@ -69,7 +69,7 @@ def bytes_of(footprints):
 
 
 def inside(step, stripe):
-    """Return whether a sole stayed in one stripe, three cells from its borders."""
+    """True if a sole stayed in one stripe, three cells from its borders."""
     y = step.window.centres(step.cell_size)[1][np.asarray(step.contact_cells) // step.window.columns]
     ends = (5.0, *BORDERS, -5.0)
     return ends[stripe + 1] + 0.06 < y.min() and y.max() < ends[stripe] - 0.06
@@ -165,9 +165,9 @@ def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     number, step = next((n, s) for n, s in enumerate(editable.record.steps) if where(s.baked) == 0)
     edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
     jobs.run(step_edits.editing(four, editable, {step.name: edit}))
-    left = baked_ground.record_of(four.softground.ground).steps[number].footprint
-    assert left.surface == "mud"
-    assert left.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
+    footprint = baked_ground.record_of(four.softground.ground).steps[number].footprint
+    assert footprint.surface == "mud"
+    assert footprint.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
 
 
 def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(four):
@@ -176,16 +176,16 @@ def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(
     theirs = [slot.material for slot in ground.material_slots]
     bpy.ops.softground.apply_look()
     shown = [slot.material for slot in baked_ground.display_mesh_of(ground).material_slots]
-    assert [one.get(MARK) for one in shown] == ["snow over", "sand over", "mud over", None]
-    assert [one.get(OVER) for one in shown[:3]] == theirs[:3]
+    assert [each.get(MARK) for each in shown] == ["snow over", "sand over", "mud over", None]
+    assert [each.get(OVER) for each in shown[:3]] == theirs[:3]
     assert shown[3] == theirs[3]
     bpy.ops.softground.load_preset(name="Soil")
     shown = [slot.material for slot in baked_ground.display_mesh_of(ground).material_slots]
-    assert [one.get(MARK) for one in shown] == ["soil over", "sand over", "mud over", None]
+    assert [each.get(MARK) for each in shown] == ["soil over", "sand over", "mud over", None]
     assert {step.surface for step in bake(four).footprints} == {"soil", "sand", "mud"}
     bpy.ops.softground.clear_bake()
     assert [slot.material for slot in ground.material_slots] == theirs
-    assert [one.softground_preset for one in theirs] == list(PRESETS)
+    assert [slot.softground_preset for slot in theirs] == list(PRESETS)
 
 
 def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset(four):
@@ -286,9 +286,9 @@ def test_a_slot_without_a_material_of_one_s_own_is_refused(four):
 def test_what_the_record_says_is_read_back(four):
     choose()
     bake(four)
-    left = baked_ground.record_of(four.softground.ground)
-    said = json.loads(json.dumps(left.about["inputs"]["regions"]))
-    assert [(one["slot"], one["preset"], one["surface"]) for one in said] == [
+    record = baked_ground.record_of(four.softground.ground)
+    said = json.loads(json.dumps(record.about["inputs"]["regions"]))
+    assert [(each["slot"], each["preset"], each["surface"]) for each in said] == [
         (1, "dry_sand", "sand"),
         (2, "mud", "mud"),
         (3, "none", ""),
@@ -363,7 +363,7 @@ def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, 
     bake(four)
     assert depths_of_layers(ground) is None
     bpy.ops.softground.clear_bake()
-    assert not [one.name for one in ground.data.attributes if one.name.startswith("softground")]
+    assert not [attribute.name for attribute in ground.data.attributes if attribute.name.startswith("softground")]
 
 
 def test_soles_carry_what_sticks_onto_a_hard_material(four):
@@ -397,6 +397,6 @@ def test_live_footprints_are_those_of_the_bake(four):
     bpy.ops.softground.live()
     four.frame_set(four.softground.frame_end)
     bpy.ops.softground.live(keep=True)
-    kept = baked_ground.record_of(four.softground.ground).footprints
+    footprints = baked_ground.record_of(four.softground.ground).footprints
     bpy.ops.softground.clear_bake()
-    assert bytes_of(kept) == bytes_of(bake(four).footprints)
+    assert bytes_of(footprints) == bytes_of(bake(four).footprints)

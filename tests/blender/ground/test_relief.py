@@ -14,7 +14,7 @@ from tests.blender.grounds import as_rendered, bake, heights, plane
 @pytest.fixture(scope="module")
 def baked(addon):
     """Heights of one walk without relief, with it, and from close by; and what the last plays."""
-    found = {}
+    values = {}
     for relief in ("OFF", "FINE", "CLOSE_UP"):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
@@ -31,8 +31,8 @@ def baked(addon):
             scene.frame_set(frame)
             frames.setdefault(frame, []).append(as_rendered(ground))
         shown = heights(ground, "SoftGround Display")
-        found[relief] = (heights(ground), shown, stored.footprints, frames, ground.data.attributes.keys())
-    return found
+        values[relief] = (heights(ground), shown, stored.footprints, frames, ground.data.attributes.keys())
+    return values
 
 
 def test_what_is_computed_is_the_same_with_it_and_what_is_shown_is_not(baked):

@@ -145,7 +145,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface, tw
     matter = matter_of(surface, about["inputs"]["material"]["layer_depth"], section_of(footprints))
     rest = ground_mesh.rest_positions(mesh)
     alone = [{name: value} for name, value in SOME.items() if name != "Time Scale"]
-    for values in ({"Time Scale": 900.0, **one} for one in (*alone, SOME)):
+    for values in ({"Time Scale": 900.0, **each} for each in (*alone, SOME)):
         set_to(scene, **values)
         said = in_core(values)
         for frame in (*FRAMES[::2], *FRAMES[1::2]):
@@ -182,7 +182,7 @@ def key(scene, name, values, interpolation="LINEAR"):
         compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], float(value))
         ground.keyframe_insert(path, frame=frame)
     curves = compat.action_curves(ground.animation_data.action)
-    curve = next(one for one in curves if one.data_path == path)
+    curve = next(each for each in curves if each.data_path == path)
     for point in curve.keyframe_points:
         point.interpolation = interpolation
     curve.update()
@@ -231,7 +231,7 @@ def test_steady_weather_is_looked_up_and_as_it_would_be_worked_out(opened, surfa
     scene = opened(surface)
     bpy.ops.softground.add_weather()
     alone = [{name: value} for name, value in SOME.items() if name != "Time Scale"]
-    for values in ({"Time Scale": 900.0, **one} for one in (*alone, SOME)):
+    for values in ({"Time Scale": 900.0, **each} for each in (*alone, SOME)):
         set_to(scene, **values)
         bpy.context.view_layer.update()
         tree, _ = table_of(scene)
@@ -243,8 +243,8 @@ def test_steady_weather_is_looked_up_and_as_it_would_be_worked_out(opened, surfa
             ages.default_value = -1.0
             worked_out = [everything(scene, frame) for frame in (34, 1, 20, 300)]
             assert ages.default_value == -1.0
-        for one, other in zip(looked_up, worked_out, strict=True):
-            assert one == pytest.approx(other, abs=2e-6 * max(1.0, float(np.abs(other).max()))), values
+        for first, other in zip(looked_up, worked_out, strict=True):
+            assert first == pytest.approx(other, abs=2e-6 * max(1.0, float(np.abs(other).max()))), values
 
 
 def test_the_table_of_steady_weather_counts_only_for_the_sliders_and_frames_that_it_is_for(opened, monkeypatch):
@@ -390,15 +390,15 @@ def test_keys_stay_through_a_bake(opened):
 def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
     scene = opened()
     before = {frame: positions(scene, frame).tobytes() for frame in FRAMES}
-    kept = contents(carrier(scene).data)
+    stored = contents(carrier(scene).data)
     bpy.ops.softground.add_weather()
     assert {frame: positions(scene, frame).tobytes() for frame in FRAMES} == before
     set_to(scene, Temperature=-20.0)  # cold alone is no weather
     assert positions(scene, 34).tobytes() == before[34]
     now = contents(carrier(scene).data)
-    assert {name: now[name] for name in kept} == kept
+    assert {name: now[name] for name in stored} == stored
     bpy.ops.softground.remove_weather()
-    assert contents(carrier(scene).data) == kept
+    assert contents(carrier(scene).data) == stored
     assert not [group for group in bpy.data.node_groups if group.name.startswith(weather_inputs.GROUP)]
 
 
@@ -406,12 +406,12 @@ def test_sliders_change_nothing_that_is_stored(opened):
     scene = opened("sand")
     bpy.ops.softground.add_weather()
     record = bytes(baked_ground.stored_record(scene.softground.ground))
-    kept = contents(carrier(scene).data)
+    before = contents(carrier(scene).data)
     still = positions(scene, 300)
     set_to(scene, **SOME)
     assert positions(scene, 300).tobytes() != still.tobytes()
     assert bytes(baked_ground.stored_record(scene.softground.ground)) == record
-    assert contents(carrier(scene).data) == kept
+    assert contents(carrier(scene).data) == before
 
 
 def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
@@ -422,7 +422,7 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     ground.modifiers.active = mine
     bpy.ops.softground.add_weather(preset="SNOWFALL")
     bpy.ops.softground.add_weather()  # renews, and leaves the sliders alone
-    assert [one.name for one in ground.modifiers] == ["SoftGround Playback", "SoftGround Weather", "Mine"]
+    assert [modifier.name for modifier in ground.modifiers] == ["SoftGround Playback", "SoftGround Weather", "Mine"]
     assert ground.modifiers.active == mine
     values = weather.values_of(scene.softground.ground)
     assert values["Snowfall"] == pytest.approx(3.0)
@@ -465,7 +465,7 @@ def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
     scene, path = opened(), tmp_path / f"ground.{kind}"
     bpy.ops.softground.add_weather(preset="SNOWFALL")
     wanted, fresh = positions(scene, 200), read(shown(scene, 200), nodes.FRESH)
-    there = set(bpy.data.objects)
+    objects = set(bpy.data.objects)
     if kind == "abc":
         exports.export_alembic(scene.softground.ground, path, 200, 201)
         bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
@@ -473,7 +473,7 @@ def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
         exports.export_usd(scene.softground.ground, path, 200, 201)
         bpy.ops.wm.usd_import(filepath=str(path))
     scene.frame_set(200)
-    meshes = [obj for obj in set(bpy.data.objects) - there if obj.type == "MESH"]
+    meshes = [obj for obj in set(bpy.data.objects) - objects if obj.type == "MESH"]
     imported = max(meshes, key=lambda obj: len(obj.data.polygons))  # the other is debris
     mesh = imported.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     world = read(mesh, "position", 3) @ np.array(imported.matrix_world.to_3x3()).T
@@ -496,12 +496,14 @@ def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
 @pytest.mark.slow
 def test_only_what_the_sliders_ask_for_is_stored(opened, values, stored):
     scene = opened("wet_sand")
-    there = set(shown(scene, 300).attributes.keys())
+    names = set(shown(scene, 300).attributes.keys())
     bpy.ops.softground.add_weather()
     set_to(scene, **values)
     anywhere = set() if "Wind" in values else {nodes.WETNESS}  # no wind blows wet sand
-    named = {one.name for one in shown(scene, 300).attributes if not one.name.startswith(".a_")}  # not what is captured
-    assert named - there - set(nodes.OF_WEATHER) == {*stored, *anywhere}
+    named = {
+        attribute.name for attribute in shown(scene, 300).attributes if not attribute.name.startswith(".a_")
+    }  # not what is captured
+    assert named - names - set(nodes.OF_WEATHER) == {*stored, *anywhere}
 
 
 @pytest.mark.slow
@@ -676,10 +678,10 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
 def test_the_panel_says_that_weather_only_covers_prints_where_there_is_some(opened):
     opened()
     panel = MagicMock()
-    for there in (False, True):
+    for has_weather in (False, True):
         weather_panel.SOFTGROUND_PT_weather.draw(panel, bpy.context)
-        assert ("Weather only covers the prints" in str(panel.mock_calls)) == there
-        assert ("steps_feel_weather" in str(panel.mock_calls)) == there
+        assert ("Weather only covers the prints" in str(panel.mock_calls)) == has_weather
+        assert ("steps_feel_weather" in str(panel.mock_calls)) == has_weather
         bpy.ops.softground.add_weather()
 
 

@@ -9,9 +9,9 @@ import pytest
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from softground_addon.blender import session
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.live import live
-from softground_addon.blender.operators import baked_steps, modal_job
+from softground_addon.blender.operators import modal_job
 from softground_addon.blender.operators.modal_job import ModalJob
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
@@ -27,7 +27,9 @@ TIMER = SimpleNamespace(type="TIMER", value="NOTHING")
 
 def kinds(of=ModalJob):
     """Names of all operators with a job."""
-    names = {one.bl_idname.partition(".")[2] for one in of.__subclasses__() if "bl_idname" in vars(one)}
+    names = {
+        subclasse.bl_idname.partition(".")[2] for subclasse in of.__subclasses__() if "bl_idname" in vars(subclasse)
+    }
     return names.union(*map(kinds, of.__subclasses__()))
 
 
@@ -131,7 +133,7 @@ def test_edits_that_change_nothing_touch_nothing(scene, press, steps):
 
 
 def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatch, steps):
-    before, left = fingerprints.of_file(), 0
+    before, undone = fingerprints.of_file(), 0
     monkeypatch.setattr(ModalJob, "execute", ModalJob._start)
     monkeypatch.setattr(modal_job, "TICK", 0.0)
     for ticks in itertools.count(step=9):
@@ -143,8 +145,8 @@ def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatc
             break
         state.jobs[0].modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS"))
         assert fingerprints.of_file() == before
-        left += 1
-    assert left > 3
+        undone += 1
+    assert undone > 3
     assert fingerprints.of_file() != before
 
 

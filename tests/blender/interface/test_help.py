@@ -68,12 +68,12 @@ def test_every_picture_of_the_manual_is_on_a_page(files, pages):
 def test_every_button_and_field_has_its_page(addon, pages):
     names = set(names_of_everything())
     assert len(names) > 150
-    found = {name: next(page for pattern, page in doors.PAGES if fnmatchcase(name, pattern)) for name in names}
-    for file, _, section in (page.partition("#") for page in found.values()):
+    page_of = {name: next(page for pattern, page in doors.PAGES if fnmatchcase(name, pattern)) for name in names}
+    for file, _, section in (page.partition("#") for page in page_of.values()):
         assert section in pages[file].sections
-    assert found["bpy.ops.softground.clean_feet"] == "response.html#clean-feet"
-    assert found["bpy.ops.softground.mute_step"] == "steps.html"
-    assert {page for _, page in doors.PAGES} == set(found.values())  # none is hidden by those above it
+    assert page_of["bpy.ops.softground.clean_feet"] == "response.html#clean-feet"
+    assert page_of["bpy.ops.softground.mute_step"] == "steps.html"
+    assert {page for _, page in doors.PAGES} == set(page_of.values())  # none is hidden by those above it
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.live import live
-from softground_addon.blender.operators import baked_steps
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.viewport import overlay, overlay_shapes
 from softground_addon.core.record import record

@@ -78,14 +78,14 @@ LABEL, CHECKBOX = 88, 112
 @pytest.mark.parametrize("language", ["en_US", *strings.LANGUAGES])
 def test_names_are_whole_in_a_sidebar_of_blender_s_own_width(addon, language):
     blf.size(0, 11.0)
-    own = translation.catalogue(language)
+    catalogue = translation.catalogue(language)
     for group in (cls for cls in registration.CLASSES if issubclass(cls, bpy.types.PropertyGroup)):
         shown = {key: setting for key, setting in group.bl_rna.properties.items() if not setting.is_hidden}
         for key, setting in shown.items():
             in_field_units = any(other.startswith(f"{key}_") for other in shown)
             if not in_field_units and key != "youngs_modulus":
                 room = CHECKBOX if setting.type == "BOOLEAN" else LABEL
-                name = own.get(setting.name, setting.name)
+                name = catalogue.get(setting.name, setting.name)
                 assert blf.dimensions(0, name)[0] <= room, name
 
 
@@ -478,8 +478,8 @@ def test_broken_preset_files_are_left_out_with_a_message(user_folder):
     (user_folder / "broken.json").write_text("{")
     (user_folder / "odd.json").write_text(json.dumps({"schema_version": 1, "name": "Odd", "material": {"x": 1}}))
     (user_folder / "good.json").write_text(presets.dump(presets.find("snow")))
-    found, broken = preset_menu.listed(user_folder)
-    assert [path.name for path, _ in found] == ["good.json"]
+    valid, broken = preset_menu.listed(user_folder)
+    assert [path.name for path, _ in valid] == ["good.json"]
     assert len(broken) == 2
     assert all("json" in message for message in broken)
 
@@ -588,12 +588,12 @@ def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     shot.softground.material.youngs_modulus = 1e8
     bpy.ops.softground.bake()
     assert buttons() == ["1 Warning"]
-    told = bake_result.SOFTGROUND_OT_show_warnings.description(bpy.context, None)
-    assert "weighs 5000 kg" in told
+    description = bake_result.SOFTGROUND_OT_show_warnings.description(bpy.context, None)
+    assert "weighs 5000 kg" in description
     menu = MagicMock()
     bake_result._draw_warnings(menu, bpy.context)
     lines = [call.kwargs["text"] for call in menu.layout.column().label.mock_calls]
-    assert " ".join(lines) == told
+    assert " ".join(lines) == description
     assert max(map(len, lines)) <= 90
     character.mass = 77.5
     bpy.ops.softground.bake()

@@ -3,10 +3,12 @@
 import bpy
 import pytest
 
-from softground_addon.blender import compat, ground_presets, handlers, jobs
+from softground_addon.blender import compat, ground_presets, handlers, jobs, settings
 from softground_addon.blender.live import live
 from softground_addon.blender.operators import prediction
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
+from softground_addon.core.composers.prediction import pressed_again
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
 from tests.blender.shots import walker
@@ -69,6 +71,38 @@ def test_a_change_is_marked_at_once_and_worked_out_soon(shot, drawing, change):
     assert after.is_current
     assert after.depth == analysis.expected_depth(shot)
     assert after.depth != pytest.approx(before.depth, rel=1e-3)
+
+
+def test_all_contacts_are_pressed_once_the_sliders_rest(shot, drawing):
+    """A sample answers while a slider moves; contacts that become typical in another material count after a moment."""
+    known = analysis.read(shot)
+    shot.softground.material.youngs_modulus /= 4
+    drawing(shot)
+    prediction._work_out()
+    sampled = drawing(shot)
+    assert sampled.is_current
+    assert bpy.app.timers.is_registered(prediction._refine)
+    while prediction._refine() is not None:
+        pass
+    refined = drawing(shot)
+    material = settings.snapshot(shot).material
+    assert refined.is_current
+    assert refined.depth == pressed_again(known.contacts, material, shot.softground.pressure).typical
+    assert refined.depth == pytest.approx(sampled.depth, rel=0.05)
+
+
+def test_a_change_ends_what_is_refined(shot, drawing):
+    analysis.read(shot)
+    softer(shot)
+    drawing(shot)
+    prediction._work_out()
+    drawing(shot)
+    state.refining.append(analysis.pressing_all(shot))
+    next(state.refining[0])
+    softer(shot)
+    drawing(shot)
+    assert not state.refining
+    assert not bpy.app.timers.is_registered(prediction._refine)
 
 
 def test_what_cannot_be_worked_out_is_known_no_more(shot, drawing, monkeypatch):

@@ -11,11 +11,11 @@ from tests.blender.grounds import bake, plane
 def finding(scene, code):
     """The one finding of a bake; it is also in the report's and the panel's warnings."""
     report = bake(scene).report
-    (found,) = report["self_check"]
-    assert found["code"] == code
+    (finding,) = report["self_check"]
+    assert finding["code"] == code
     shown = ground_mesh.warnings_of(baked_ground.display_mesh_of(scene.softground.ground))
     assert list(shown) == report["warnings"]
-    return found
+    return finding
 
 
 def rig_of(scene):
@@ -30,7 +30,7 @@ def test_gravity_in_which_nobody_stands_is_said(short_walk, direction):
 
 def test_gravity_that_points_into_a_slope_says_nothing(short_walk):
     short_walk.gravity = (1.0, 0, -9.7)
-    assert "gravity_direction" not in {one["code"] for one in bake(short_walk).report["self_check"]}
+    assert "gravity_direction" not in {finding["code"] for finding in bake(short_walk).report["self_check"]}
 
 
 def test_gravity_that_is_switched_off_or_weak_points_nowhere_else(short_walk):
@@ -47,7 +47,7 @@ def test_a_walk_so_far_from_the_origin_that_cells_are_rounded_away_is_said(short
     ground = plane(short_walk)
     ground.location.x = away
     bpy.context.view_layer.update()
-    codes = {one["code"]: one["message"] for one in bake(short_walk, ground=ground).report["self_check"]}
+    codes = {finding["code"]: finding["message"] for finding in bake(short_walk, ground=ground).report["self_check"]}
     assert ("far_from_origin" in codes) == said
     if said:
         shown = "548 km from the world's origin, where Blender shows positions rounded to 6.2 cm"
@@ -83,7 +83,7 @@ def test_a_strip_without_a_slot_is_named_where_it_plays(short_walk, spoilt):
     second.action_slot = None
     second.mute = spoilt == "muted"
     findings = bake(short_walk).report["self_check"]
-    said = [one["message"] for one in findings if one["code"] == "no_slot"]
+    said = [finding["message"] for finding in findings if finding["code"] == "no_slot"]
     assert bool(said) == (spoilt == "slot")
     if said:
         assert said[0].startswith("NLA strip 'part 1' of 'Walker' has no slot: nothing moves by it in frames 31-60")
@@ -145,7 +145,9 @@ def test_a_prop_that_changes_its_shape_says_so_when_it_is_added_and_baked(scene,
     assert f"'Cube' changes its shape by {by}, but prints as a rigid body" in said
     assert "does not move" not in said
     scene.softground.cell_size, scene.softground.frame_start, scene.softground.frame_end = 0.02, 1, 20
-    messages = [one["message"] for one in bake(scene).report["self_check"] if one["code"] == "changing_shape"]
+    messages = [
+        finding["message"] for finding in bake(scene).report["self_check"] if finding["code"] == "changing_shape"
+    ]
     assert len(messages) == 1
     assert by in messages[0]
 
@@ -165,6 +167,6 @@ def test_a_frame_handler_that_moves_the_rig_is_named_and_another_is_not(short_wa
             report = bake(short_walk).report
         finally:
             bpy.app.handlers.frame_change_post.remove(handler)
-        assert [one["code"] for one in report["self_check"]] == said
-        assert all(f"a frame handler of '{__name__}'" in one["message"] for one in report["self_check"])
+        assert [finding["code"] for finding in report["self_check"]] == said
+        assert all(f"a frame handler of '{__name__}'" in finding["message"] for finding in report["self_check"])
         bpy.ops.softground.clear_bake()

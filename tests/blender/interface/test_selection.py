@@ -198,7 +198,7 @@ def test_a_deleted_character_neither_bakes_nor_sets_the_frames_of_the_next(scene
     second = shots.walker(scene, frames=30)
     select(second)
     bpy.ops.softground.add_character()
-    assert [settings.is_set_up(one) for one in scene.softground.characters] == [False, True]
+    assert [settings.is_set_up(character) for character in scene.softground.characters] == [False, True]
     assert (scene.softground.frame_start, scene.softground.frame_end) == (1, 30)
 
 
@@ -298,7 +298,7 @@ def test_a_crowd_of_instances_is_refused_and_beside_a_rig_that_bakes_it_is_named
     select(walker)
     bpy.ops.softground.add_character()
     scene.softground.cell_size = 0.02
-    assert [one["code"] for one in bake(scene).report["self_check"]] == ["instances"]
+    assert [finding["code"] for finding in bake(scene).report["self_check"]] == ["instances"]
 
 
 def test_instances_of_something_else_that_read_where_a_body_is_are_no_crowd(scene):

@@ -81,7 +81,7 @@ def change(owner, name, scene):
         setattr(owner, name, None)
     elif setting.type == "POINTER":
         kind = "ARMATURE" if name == "armature" else "MESH"
-        other = next((one for one in scene.objects if one.type == kind and one != value), None)
+        other = next((obj for obj in scene.objects if obj.type == kind and obj != value), None)
         setattr(owner, name, other if value is None else None)
     elif setting.type == "ENUM":
         setattr(owner, name, next(item.identifier for item in setting.enum_items if item.identifier != value))

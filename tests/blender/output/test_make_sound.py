@@ -122,7 +122,7 @@ def test_the_command_line_writes_it_in_stereo_from_the_camera(scene, tmp_path):
     assert cli.run_in_blender(["export", "--format", "wav", "--stereo", "--output", str(tmp_path / "a.wav")]) == 0
     left, right = np.abs(read(tmp_path / "a.wav").astype(float)).mean(axis=0)
     footprints, _ = baked_ground.load(scene.softground.ground)
-    sides = [(camera.matrix_world.inverted() @ bpy_vector(one.position)).x for one in footprints]
+    sides = [(camera.matrix_world.inverted() @ bpy_vector(footprint.position)).x for footprint in footprints]
     assert (left > right) == (np.mean(sides) < 0)
     assert scene.frame_current == frame
 
@@ -145,12 +145,12 @@ def test_own_sounds_come_from_a_folder_and_an_empty_one_is_named(scene, tmp_path
 
 
 def test_own_sounds_are_not_written_over(scene, tmp_path):
-    own = tmp_path / "mine" / "snow_1.wav"
-    own.parent.mkdir()
-    write_tone(own)
-    before = own.read_bytes()
-    (tmp_path / "again.wav").symlink_to(own)
-    for target in (own, tmp_path / "again.wav"):
-        options = ["export", "--format", "wav", "--samples", str(own.parent), "--output", str(target)]
+    recording = tmp_path / "mine" / "snow_1.wav"
+    recording.parent.mkdir()
+    write_tone(recording)
+    before = recording.read_bytes()
+    (tmp_path / "again.wav").symlink_to(recording)
+    for target in (recording, tmp_path / "again.wav"):
+        options = ["export", "--format", "wav", "--samples", str(recording.parent), "--output", str(target)]
         assert cli.run_in_blender(options) == 2
-    assert own.read_bytes() == before
+    assert recording.read_bytes() == before

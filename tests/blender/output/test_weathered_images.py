@@ -103,7 +103,7 @@ def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame
 def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):
     scene = opened("mud", **weathered_shots.SOME)
     (tmp_path / "own").mkdir()
-    own = write(scene, tmp_path / "own", 30)
+    weathered = write(scene, tmp_path / "own", 30)
     library, name = tmp_path / "library.blend", scene.softground.ground.name
     bpy.ops.wm.save_as_mainfile(filepath=str(library))
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -114,9 +114,9 @@ def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):
     scene.softground.ground = linked.objects[0]
     (tmp_path / "linked").mkdir()
     of_linked = write(scene, tmp_path / "linked", 30)
-    assert own["weather"][..., 2].max() > 1e-3
+    assert weathered["weather"][..., 2].max() > 1e-3
     for kind in KINDS:
-        np.testing.assert_allclose(of_linked[kind], own[kind], atol=1e-6)
+        np.testing.assert_allclose(of_linked[kind], weathered[kind], atol=1e-6)
 
 
 def test_keyed_weather_and_remapped_time_are_those_of_the_scene(opened, tmp_path):
@@ -150,14 +150,14 @@ def test_hidden_weather_and_none_write_the_bake_alone(opened, tmp_path):
 def test_an_export_leaves_nothing_behind(opened, tmp_path):
     scene = opened("mud", **weathered_shots.SOME)
 
-    def there():
-        return {kind: {one.name for one in getattr(bpy.data, kind)} for kind in ("meshes", "objects", "scenes")}
+    def existing():
+        return {kind: {each.name for each in getattr(bpy.data, kind)} for kind in ("meshes", "objects", "scenes")}
 
-    before = there()
+    before = existing()
     image_exports.export_images(
         scene.softground.ground, tmp_path, 30, 31, units=settings.units_of(scene), resolution=32
     )
-    assert there() == before
+    assert existing() == before
     assert len(list(tmp_path.glob("*_weather_*.exr"))) == 2
 
 

@@ -12,7 +12,7 @@ from mathutils.bvhtree import BVHTree
 from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.node_modifiers import inputs_of
+from softground_addon.blender.nodes.node_modifiers import inputs_of
 from softground_addon.blender.plants import give_way_nodes, trampling_table
 from softground_addon.blender.playback import own_data
 from softground_addon.core.plants.bending import MOST_LASTING, PLANTS
@@ -117,8 +117,8 @@ def blades(obj):
     """Roots and tips (N, 3) of a scatter as it is evaluated."""
     graph = bpy.context.evaluated_depsgraph_get()
     if obj.modifiers and obj.name == "Scatter":
-        found = [i.matrix_world.copy() for i in graph.object_instances if i.parent and i.parent.original == obj]
-        return tuple(np.array([m @ Vector((0, 0, height)) for m in found]) for height in (0.0, HEIGHT))
+        matrices = [i.matrix_world.copy() for i in graph.object_instances if i.parent and i.parent.original == obj]
+        return tuple(np.array([m @ Vector((0, 0, height)) for m in matrices]) for height in (0.0, HEIGHT))
     data = obj.evaluated_get(graph).data
     position = data.attributes["position"].data
     flat = np.empty(3 * len(position), np.float32)
@@ -180,7 +180,7 @@ def state(obj):
 @pytest.mark.parametrize("kind", KINDS)
 def test_before_the_first_step_it_is_the_scatter_and_so_it_is_without_the_modifier(shot, kind):
     obj = KINDS[kind](roots())
-    before, own = state(obj), fingerprints.of_object(obj)["modifiers"]
+    before, modifiers = state(obj), fingerprints.of_object(obj)["modifiers"]
     data = fingerprints.of_mesh(obj.data) if obj.type == "MESH" else None
     modifier = give_way(obj)
     shot.frame_set(-100)
@@ -190,7 +190,7 @@ def test_before_the_first_step_it_is_the_scatter_and_so_it_is_without_the_modifi
     obj.modifiers.remove(modifier)
     bpy.context.view_layer.update()
     assert state(obj) == before
-    assert fingerprints.of_object(obj)["modifiers"] == own
+    assert fingerprints.of_object(obj)["modifiers"] == modifiers
     assert data is None or fingerprints.of_mesh(obj.data) == data
 
 
@@ -279,11 +279,11 @@ def test_plants_may_give_way_before_there_is_a_bake(opened_as):
 
 def test_it_holds_wherever_scatter_and_ground_are_moved_to(shot):
     place = roots()
-    one, other = hair(place), hair(place)
-    give_way(one, other)
+    first, other = hair(place), hair(place)
+    give_way(first, other)
     move = Matrix.Translation((3.0, -2.0, 0.5)) @ Matrix.Rotation(0.7, 4, "Z")
     shot.frame_set(40)
-    expected = blades(one)[1]
+    expected = blades(first)[1]
     # The points of one are elsewhere, and its object brings them back.
     flat = np.column_stack([blades_of(other), np.ones(len(place) * POINTS)]) @ np.array(move.inverted()).T
     other.data.attributes["position"].data.foreach_set("vector", flat[:, :3].astype(np.float32).ravel())
@@ -462,13 +462,13 @@ def test_hardly_a_blade_is_inside_a_shoe_that_stands(shot):
 
     def count(frames, shown):
         modifier.show_viewport = shown
-        found = 0
+        count = 0
         for frame in frames:
             shot.frame_set(frame)
             root, tip = blades(grass)
             along = np.linspace(0.05, 0.6, 8)[:, None, None]
-            found += inside_shoes(figure, (root + along * (tip - root)).reshape(-1, 3)).reshape(8, -1).any(axis=0).sum()
-        return found
+            count += inside_shoes(figure, (root + along * (tip - root)).reshape(-1, 3)).reshape(8, -1).any(axis=0).sum()
+        return count
 
     stand, swing = (10, 24, 38), (17, 31, 44)
     assert count(stand, True) < 0.06 * count(stand, False)

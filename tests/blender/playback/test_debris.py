@@ -15,11 +15,12 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs, mesh_arrays, node_modifiers, settings
+from softground_addon.blender import compat, jobs, mesh_arrays, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.debris import debris_object, debris_shapes
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import exports, image_exports
 from softground_addon.core.debris import flight
 from softground_addon.core.ground.surfaces import SURFACES
@@ -88,31 +89,36 @@ def pieces(obj):
     """Places of all shapes and of all round points that are seen."""
     graph = bpy.context.evaluated_depsgraph_get()
     shapes, points = [], []
-    for one in graph.object_instances:  # each lives for its turn only
-        if one.is_instance and one.parent and one.parent.original == obj:
-            if one.object.type == "POINTCLOUD":
-                at = np.empty(3 * len(one.object.data.points), np.float32)
-                one.object.data.attributes["position"].data.foreach_get("vector", at)
-                points += [tuple(one.matrix_world @ Vector(place)) for place in at.reshape(-1, 3)]
+    for instance in graph.object_instances:  # each lives for its turn only
+        if instance.is_instance and instance.parent and instance.parent.original == obj:
+            if instance.object.type == "POINTCLOUD":
+                at = np.empty(3 * len(instance.object.data.points), np.float32)
+                instance.object.data.attributes["position"].data.foreach_get("vector", at)
+                points += [tuple(instance.matrix_world @ Vector(place)) for place in at.reshape(-1, 3)]
             else:
-                shapes.append(tuple(one.matrix_world.translation))
+                shapes.append(tuple(instance.matrix_world.translation))
     return shapes, points
 
 
 def points_of(obj):
     """Attributes of all round points that are seen, in world space, by name: (N, 1 or 3)."""
-    found = {name: [] for name in ("position", "velocity", "age", "radius", "kind", "step")}
-    for one in bpy.context.evaluated_depsgraph_get().object_instances:  # each lives for its turn only
-        if one.is_instance and one.parent and one.parent.original == obj and one.object.type == "POINTCLOUD":
-            for name, parts in found.items():
+    columns = {name: [] for name in ("position", "velocity", "age", "radius", "kind", "step")}
+    for instance in bpy.context.evaluated_depsgraph_get().object_instances:  # each lives for its turn only
+        if (
+            instance.is_instance
+            and instance.parent
+            and instance.parent.original == obj
+            and instance.object.type == "POINTCLOUD"
+        ):
+            for name, parts in columns.items():
                 size = 3 if name in ("position", "velocity") else 1
-                part = np.empty(len(one.object.data.points) * size, np.float32)
-                one.object.data.attributes[name].data.foreach_get("vector" if size == 3 else "value", part)
+                part = np.empty(len(instance.object.data.points) * size, np.float32)
+                instance.object.data.attributes[name].data.foreach_get("vector" if size == 3 else "value", part)
                 parts.append(part.reshape(-1, size))
-            matrix = np.array(one.matrix_world)
-            found["position"][-1] = found["position"][-1] @ matrix[:3, :3].T + matrix[:3, 3]
-            found["velocity"][-1] = found["velocity"][-1] @ matrix[:3, :3].T
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+            matrix = np.array(instance.matrix_world)
+            columns["position"][-1] = columns["position"][-1] @ matrix[:3, :3].T + matrix[:3, 3]
+            columns["velocity"][-1] = columns["velocity"][-1] @ matrix[:3, :3].T
+    return {name: np.concatenate(parts) for name, parts in columns.items()}
 
 
 def shown(obj):
@@ -134,7 +140,7 @@ def wanted(obj, frame, wind=(0.0, 0.0, 0.0)):
 
 
 def test_debris_flies_as_the_closed_form_says_in_any_order_of_frames(scene):
-    (obj,) = [one for one in scene.objects if one.name.startswith("SoftGround Debris")]
+    (obj,) = [each for each in scene.objects if each.name.startswith("SoftGround Debris")]
     counts = []
     for frame in (24, 3, 12, 24, 9):
         scene.frame_set(frame)
@@ -200,7 +206,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     """Moved, deepened, scaled and shifted in time, muted, and a copy on an earlier print."""
     ground = scene.softground.ground
     bake = jobs.run(step_edits.reading(scene))
-    names = [step_id(one) for one in bake.record.footprints]
+    names = [step_id(footprint) for footprint in bake.record.footprints]
     edits = {
         names[0]: StepEdit(move_m=(0.3, 0.2), turn_deg=40.0),
         names[1]: StepEdit(strength=2.0),
@@ -210,24 +216,24 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     }
     before = values(debris_object.of(ground), "step")
     jobs.run(step_edits.editing(scene, bake, edits))
-    left = record.load(bytes(baked_ground.stored_record(ground)))
-    edited, content = fingerprints.of_mesh(debris_object.of(ground).data), record.dump(replace(left, about={}))
+    loaded = record.load(bytes(baked_ground.stored_record(ground)))
+    edited, content = fingerprints.of_mesh(debris_object.of(ground).data), record.dump(replace(loaded, about={}))
     report = jobs.run(bake_job.bake(scene)).report
-    left = record.load(bytes(baked_ground.stored_record(ground)))
-    assert record.dump(replace(left, about={})) == content
+    loaded = record.load(bytes(baked_ground.stored_record(ground)))
+    assert record.dump(replace(loaded, about={})) == content
     assert fingerprints.of_mesh(debris_object.of(ground).data) == edited
     steps = values(debris_object.of(ground), "step")
     assert 2 in before
-    assert set(steps) == set(left.thrown) >= {0, 1, 3, 1 + len(names)}
+    assert set(steps) == set(loaded.thrown) >= {0, 1, 3, 1 + len(names)}
     assert 2 not in steps
     displaced = 2 * scene.softground.material.poisson_ratio
-    for step in left.steps:
+    for step in loaded.steps:
         if step.footprint:
             thrown = sum(step.thrown.values())
             assert step.footprint.rim_m3 + thrown == pytest.approx(displaced * step.footprint.compressed_m3, rel=1e-6)
     totals = report["totals"]
     assert totals["rim_m3"] + totals["thrown_m3"] == pytest.approx(
-        displaced * sum(step.footprint.compressed_m3 for step in left.steps if step.footprint), rel=1e-6
+        displaced * sum(step.footprint.compressed_m3 for step in loaded.steps if step.footprint), rel=1e-6
     )
     thrown = sum(row["thrown_kg"] for row in baked_ground.events_of(ground))
     assert thrown == pytest.approx(totals["thrown_m3"] * SURFACES["sand"].density, rel=1e-3)
@@ -326,7 +332,7 @@ def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
     scene.softground.debris = True
     for _ in range(2):  # the second takes the place of the first
         assert bpy.ops.softground.bake() == {"FINISHED"}
-        assert sum(one.name.startswith("SoftGround Debris") for one in scene.objects) == 1
+        assert sum(obj.name.startswith("SoftGround Debris") for obj in scene.objects) == 1
     bpy.ops.softground.clear_bake()
     assert {name: len(getattr(bpy.data, name)) for name in before} == before
     assert fingerprints.of_mesh(scene.softground.ground.data) == ground
@@ -348,30 +354,30 @@ def test_debris_that_was_deleted_in_the_viewport_goes_with_the_next_bake(scene):
         collection.objects.unlink(deleted)
     assert debris_object.of(ground) is None
     debris_object.remove(ground)
-    assert not any(one.name.startswith("SoftGround Debris") for one in bpy.data.objects)
+    assert not any(obj.name.startswith("SoftGround Debris") for obj in bpy.data.objects)
 
 
 def test_off_costs_nothing_and_takes_the_older_away(scene):
     scene.softground.debris = False
     assert bpy.ops.softground.bake() == {"FINISHED"}
     assert debris_object.of(scene.softground.ground) is None
-    assert not [one for one in bpy.data.node_groups if one.name.startswith("SoftGround Debris")]
-    assert not [one for one in bpy.data.collections if one.name.startswith("SoftGround")]
+    assert not [group for group in bpy.data.node_groups if group.name.startswith("SoftGround Debris")]
+    assert not [collection for collection in bpy.data.collections if collection.name.startswith("SoftGround")]
 
 
 def test_an_artists_own_shapes_and_wind_stay_with_the_next_bake(scene):
-    own = bpy.data.collections.new("Leaves")
-    own.objects.link(bpy.data.objects.new("Leaf", bpy.data.meshes.new("Leaf")))
+    leaves = bpy.data.collections.new("Leaves")
+    leaves.objects.link(bpy.data.objects.new("Leaf", bpy.data.meshes.new("Leaf")))
     obj = debris_object.of(scene.softground.ground)
     modifier = obj.modifiers[0]
-    set_input(modifier, "Shapes", own)
+    set_input(modifier, "Shapes", leaves)
     set_input(modifier, "Wind", (1.0, 2.0, 0.0))
     assert bpy.ops.softground.bake() == {"FINISHED"}
     modifier = debris_object.of(scene.softground.ground).modifiers[0]
-    assert get_input(modifier, "Shapes") == own
+    assert get_input(modifier, "Shapes") == leaves
     assert list(get_input(modifier, "Wind")) == [1.0, 2.0, 0.0]
     bpy.ops.softground.clear_bake()
-    assert own.name in bpy.data.collections
+    assert leaves.name in bpy.data.collections
 
 
 def delete(obj):
@@ -408,7 +414,7 @@ def test_another_bake_gives_debris_new_points_and_leaves_all_that_the_user_did_t
     assert len(obj.data.vertices) != first
     assert fingerprints.of_object(obj) == before
     assert (list(obj.users_collection), modifier.node_group) == ([mine], group)
-    assert [one.name for one in obj.data.materials] == ["Glitter"]
+    assert [material.name for material in obj.data.materials] == ["Glitter"]
     assert piece.active_material.name == "Gold"
     set_input(modifier, "Amount", 1.0)
     obj.animation_data_clear()
@@ -430,7 +436,7 @@ def test_debris_of_another_surface_looks_like_that(scene):
     assert debris_object.of(scene.softground.ground) == obj
     assert get_input(obj.modifiers[0], "Shapes").name == "SoftGround Snow Pieces"
     assert sand not in bpy.data.collections
-    assert sum(one.name.startswith("SoftGround Debris") for one in bpy.data.node_groups) == 1
+    assert sum(group.name.startswith("SoftGround Debris") for group in bpy.data.node_groups) == 1
 
 
 def test_where_the_ground_was_deleted_no_debris_hangs_in_the_air_and_the_next_bake_takes_it_over(scene):
@@ -450,7 +456,7 @@ def test_where_the_ground_was_deleted_no_debris_hangs_in_the_air_and_the_next_ba
     assert obj.name in scene.objects
     assert obj.display_type == "BOUNDS"
     assert obj.parent == scene.softground.ground
-    assert sum(bool(one.get("softground_debris")) for one in bpy.data.objects) == 2
+    assert sum(bool(obj.get("softground_debris")) for obj in bpy.data.objects) == 2
     assert bake_report.stale_reasons(scene) == ()
 
 
@@ -468,7 +474,7 @@ def test_where_the_copy_that_shows_the_prints_was_deleted_no_debris_hangs_in_the
     assert debris_object.of(ground) == obj
     delete(ground)
     bpy.ops.softground.clear_bake()
-    assert not any(one.name.startswith("SoftGround Debris") for one in bpy.data.objects)
+    assert not any(obj.name.startswith("SoftGround Debris") for obj in bpy.data.objects)
 
 
 def test_undo_brings_debris_back_with_its_ground(scene):
@@ -481,7 +487,7 @@ def test_undo_brings_debris_back_with_its_ground(scene):
     delete(scene.softground.ground)
     bpy.ops.ed.undo_push(message="Delete")
     bpy.context.view_layer.update()
-    assert not [one for one in bpy.context.scene.objects if one.name.startswith("SoftGround Debris")]
+    assert not [obj for obj in bpy.context.scene.objects if obj.name.startswith("SoftGround Debris")]
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     scene = bpy.context.scene
@@ -515,9 +521,9 @@ def test_light_goes_through_pieces_in_cycles_alone_as_eevee_draws_it_dark(scene,
 def test_points_lie_where_they_come_to_rest(scene):
     obj = debris_object.of(scene.softground.ground)
     rest = places_of(obj)
-    there = wanted(obj, 1e4)
-    assert len(rest) == len(there)  # of two that lie side by side, either may be sorted first
-    assert max(KDTree(rest).query(there)[0].max(), KDTree(there).query(rest)[0].max()) < 1e-4
+    pieces = wanted(obj, 1e4)
+    assert len(rest) == len(pieces)  # of two that lie side by side, either may be sorted first
+    assert max(KDTree(rest).query(pieces)[0].max(), KDTree(pieces).query(rest)[0].max()) < 1e-4
 
 
 COUNT = """
@@ -539,8 +545,8 @@ def test_it_plays_without_the_add_on_and_without_scripts(baked, scene):
 def arrays_of_points(text, name):
     """Samples of an array in a USD file in text, by frame."""
     block = re.search(rf"\b{name}\.timeSamples = \{{(.*?)\n\s*\}}", text, re.DOTALL)[1]
-    found = re.findall(r"([-\d.]+): \[(.*?)\]", block, re.DOTALL)
-    return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in found}
+    samples = re.findall(r"([-\d.]+): \[(.*?)\]", block, re.DOTALL)
+    return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in samples}
 
 
 def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
@@ -571,11 +577,11 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     landed = values(obj, "softground_birth") + 24 * values(obj, "softground_flight")
     centre = ((np.arange(resolution) + 0.5) / resolution - 0.5) * side
     for frame in (1, 8, 20):
-        (path,) = [one for one in paths if one.name.endswith(f"debris_{frame:04d}.exr")]
+        (path,) = [each for each in paths if each.name.endswith(f"debris_{frame:04d}.exr")]
         thickness, cover, since, _ = np.moveaxis(read_image(path), -1, 0)
         down = landed <= frame
-        there = thickness.sum() * (side / resolution) ** 2
-        assert there == pytest.approx(volume[down].sum(), rel=0.05, abs=1e-12)
+        shown_volume = thickness.sum() * (side / resolution) ** 2
+        assert shown_volume == pytest.approx(volume[down].sum(), rel=0.05, abs=1e-12)
         assert (cover.max() > 0.1) == (frame > 1)
         assert ((since >= 0) == (thickness > 0)).all()
         assert since.max() <= frame / 24
@@ -585,10 +591,10 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
             assert shown == pytest.approx(lies, abs=0.02)
     set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
     blown = debris_object.at_rest(obj, settings.units_of(scene)).place
-    there = wanted(obj, 1e4, (3, 0, 0))
-    beside = (there[:, 2] < -5).sum()  # what fell beside the ground lies nowhere, and grains fall slowly
-    assert len(there) - len(blown) == beside < 0.002 * len(there)
-    assert KDTree(there[:, :2]).query(blown)[0].max() < 1e-4
+    shown_volume = wanted(obj, 1e4, (3, 0, 0))
+    beside = (shown_volume[:, 2] < -5).sum()  # what fell beside the ground lies nowhere, and grains fall slowly
+    assert len(shown_volume) - len(blown) == beside < 0.002 * len(shown_volume)
+    assert KDTree(shown_volume[:, :2]).query(blown)[0].max() < 1e-4
 
 
 @pytest.mark.slow
@@ -619,9 +625,9 @@ def test_alembic_carries_debris_as_points_with_speeds(scene, tmp_path):
     obj, before = debris_object.of(ground), fingerprints.of_file()
     exports.export_alembic(ground, tmp_path / "shot.abc", 8, 20)
     assert fingerprints.of_file() == before
-    there = set(bpy.data.objects)
+    objects = set(bpy.data.objects)
     bpy.ops.wm.alembic_import(filepath=str(tmp_path / "shot.abc"), as_background_job=False)
-    (copy,) = [one for one in set(bpy.data.objects) - there if one.type == "MESH" and not len(one.data.polygons)]
+    (copy,) = [each for each in set(bpy.data.objects) - objects if each.type == "MESH" and not len(each.data.polygons)]
     for frame in (10, 16, 20):
         scene.frame_set(frame)
         shown = copy.evaluated_get(bpy.context.evaluated_depsgraph_get())

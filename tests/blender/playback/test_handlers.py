@@ -10,7 +10,7 @@ from softground_addon.blender import handlers
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
-from softground_addon.blender.sampling import sampling_scene, temporary
+from softground_addon.blender.sampling import sampling_scene
 from tests.blender.shots import walker
 
 IDLE_LINES = 8
@@ -88,7 +88,7 @@ def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene, tmp_pat
 
 
 def test_a_scene_of_the_users_stays_whatever_its_name(scene):
-    mine = bpy.data.scenes.new(temporary.TEMPORARY)
+    mine = bpy.data.scenes.new(sampling_scene.TEMPORARY)
     handlers.after_load()
     handlers.after_undo()
     assert mine.name in bpy.data.scenes

@@ -160,12 +160,12 @@ def test_kept_prints_are_pressed_with_the_settings_that_they_are_stamped_with(li
     options.pressure = "CENTRE_OF_PRESSURE"
     options.frame_end = 30
     bpy.ops.softground.live(keep=True)
-    kept, about = baked_ground.load(options.ground)
+    footprints, about = baked_ground.load(options.ground)
     assert about["inputs"]["material"]["youngs_modulus"] == stiff / 4
     assert bake_report.stale_reasons(live_shot) == ()
     bpy.ops.softground.bake()
     baked, _ = baked_ground.load(options.ground)
-    assert [f.max_depth_m for f in kept] == [f.max_depth_m for f in baked]
+    assert [f.max_depth_m for f in footprints] == [f.max_depth_m for f in baked]
 
 
 def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
@@ -204,12 +204,12 @@ def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     live_shot.frame_set(live_shot.softground.frame_end)
     bpy.ops.softground.live(keep=True)
     ground = live_shot.softground.ground
-    kept = ground_mesh.summary_of(ground)
+    summary = ground_mesh.summary_of(ground)
     assert bake_report.stale_reasons(live_shot) == ()
     assert bpy.ops.softground.export(filepath=str(tmp_path / "ground.pc2"), format="PC2") == {"FINISHED"}
     bpy.ops.softground.bake()
     baked = ground_mesh.summary_of(ground)
-    assert kept == {key: pytest.approx(baked[key]) for key in kept}
+    assert summary == {key: pytest.approx(baked[key]) for key in summary}
 
 
 def test_kept_prints_throw_what_those_of_a_bake_throw(live_shot):
@@ -218,16 +218,16 @@ def test_kept_prints_throw_what_those_of_a_bake_throw(live_shot):
     live_shot.softground.debris = True  # at the last moment, as live mode shows none
     assert debris_object.of(ground) is None
     bpy.ops.softground.live(keep=True)
-    kept, pieces = baked_ground.load(ground)[0], fingerprints.of_mesh(debris_object.of(ground).data)
+    footprints, pieces = baked_ground.load(ground)[0], fingerprints.of_mesh(debris_object.of(ground).data)
     assert bake_report.stale_reasons(live_shot) == ()
     bpy.ops.softground.bake()
     baked = baked_ground.load(ground)[0]
-    assert [one.rim_m3 for one in kept] == [one.rim_m3 for one in baked]
+    assert [each.rim_m3 for each in footprints] == [each.rim_m3 for each in baked]
     assert fingerprints.of_mesh(debris_object.of(ground).data) == pieces
     live_shot.softground.debris = False
     bpy.ops.softground.bake()
     full = baked_ground.load(ground)[0]
-    assert sum(one.rim_m3 for one in full) > 1.02 * sum(one.rim_m3 for one in baked)
+    assert sum(each.rim_m3 for each in full) > 1.02 * sum(each.rim_m3 for each in baked)
 
 
 def lowest(scene):
@@ -317,7 +317,7 @@ def test_newest_steps_follow_a_slider_first_and_while_it_is_dragged(scene):
             live.answer(0.0)
         depths.append(display_heights(scene))
     assert before[newest].min() > depths[0][newest].min() > depths[1][newest].min() > depths[2][newest].min()
-    assert {one[oldest].min() for one in depths} == {before[oldest].min()}
+    assert {depth[oldest].min() for depth in depths} == {before[oldest].min()}
     answered(scene)
     shown = display_heights(scene)
     assert shown[oldest].min() < 1.5 * before[oldest].min()

@@ -224,15 +224,6 @@ def test_a_renamed_playback_is_still_known(scene, footprints):
     assert not bpy.data.node_groups
 
 
-def test_a_playback_of_before_groups_were_marked_is_known_by_its_name(scene, footprints):
-    ground = ground_object(scene)
-    bake_onto(ground, footprints)
-    group = ground.modifiers[0].node_group
-    del group[playback.nodes.MARK]
-    group.name = "SoftGround Playback.012"
-    assert playback.modifier_of(ground) == ground.modifiers[0]
-
-
 def test_removal_leaves_nothing_on_a_copy_with_the_same_mesh(scene, footprints):
     ground = ground_object(scene)
     bake_onto(ground, footprints)

@@ -91,10 +91,10 @@ def in_the_ground(footprints, places, frame):
 )
 def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_any_frame(scene, skins, snow):
     walker(scene, **snow)
-    _, left = bake(scene)
+    _, record_of_bake = bake(scene)
     (skin,) = skins
     depths = [
-        in_the_ground(left.shaping, places, frame).max()
+        in_the_ground(record_of_bake.shaping, places, frame).max()
         for frame, places in zip(skin.frames, skin.at(np.arange(FRAMES)), strict=True)
     ]
     print(f"\nskin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
@@ -138,13 +138,13 @@ def test_nor_of_who_runs_crawls_or_goes_on_four_legs(scene, skins, mover, snow):
     options.frame_end, options.sink_feet, options.pressure = FRAMES, True, "CENTRE_OF_PRESSURE"
     for name, value in snow.items():
         setattr(options.material, name, value)
-    report, left = bake(scene)
+    report, record_of_bake = bake(scene)
     (skin,) = skins
     depths = [
-        in_the_ground(left.shaping, places, frame).max()
+        in_the_ground(record_of_bake.shaping, places, frame).max()
         for frame, places in zip(skin.frames, skin.at(np.arange(len(skin.frames))), strict=True)
     ]
-    deepest = max(step.max_depth_m for step in left.footprints)
+    deepest = max(step.max_depth_m for step in record_of_bake.footprints)
     print(f"\ndeepest {deepest:.3f} m, skin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
     assert report["carved"]
     assert max(depths) <= CELL
@@ -164,22 +164,22 @@ def test_what_a_body_drags_carves_the_snow(scene):
     behind = armature.matrix_world @ armature.pose.bones["hips"].matrix.translation
     sledge.matrix_world = Matrix.Translation((behind.x + 0.6, behind.y, 0.2))  # aside, 10 cm deep as feet sink
     bpy.context.view_layer.update()
-    _, left = bake(scene)
+    _, record_of_bake = bake(scene)
     scene.frame_set(FRAMES // 2)
     shown = sledge.matrix_world.translation
     assert -0.25 < shown.z < -0.05
-    compression, rim = recompose(left.shaping, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    compression, rim = recompose(record_of_bake.shaping, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
     assert (rim - compression)[0] < shown.z + 0.02
-    without = recompose(left.edited, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    without = recompose(record_of_bake.edited, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
     assert without[1][0] - without[0][0] > -0.01
 
 
 def test_between_two_holes_the_ground_is_5_cm_lower_than_the_snow(scene):
     walker(scene, frames=60, **SHIN_DEEP)
-    _, left = bake(scene)
-    ground = recompose(left.shaping)
+    _, record_of_bake = bake(scene)
+    ground = recompose(record_of_bake.shaping)
     for sole in ("foot.L", "foot.R"):
-        first, second = [step for step in left.footprints if step.sole == sole][:2]
+        first, second = [step for step in record_of_bake.footprints if step.sole == sole][:2]
         assert first.max_depth_m == pytest.approx(0.2, abs=0.01)
         along = np.linspace(first.position, second.position, 200)
         compression, rim = ground.nearest(*along[:, :2].T)
@@ -202,34 +202,34 @@ def test_what_is_carved_follows_neither_from_the_cells_nor_from_the_frame_rate(a
 
 def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scene, skins):
     armature = walker(scene, **DEEP)
-    report, left = bake(scene)
+    report, record_of_bake = bake(scene)
     (skin,) = skins
     before = []
     for frame in range(4, FRAMES, 8):
         scene.frame_set(frame)
         places = skin.at(np.array([frame - 1]))[0]
         assert places == pytest.approx(shown_skin(armature), abs=1e-3)
-        before.append(in_the_ground(left.edited, places, frame).max())
+        before.append(in_the_ground(record_of_bake.edited, places, frame).max())
     print(f"\nskin in the ground without its carves: {np.round(before, 3)} m; {report['carved']}")
     assert np.median(before) > 0.1
     volumes = report["carved"][armature.name]
     assert 0.005 < volumes["cut_m3"] < 0.05
     assert report["totals"]["carved_m3"] == pytest.approx(volumes["cut_m3"], rel=1e-12)
-    lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
+    lying = sum(carve.tile(carve.rim).sum() for carve in record_of_bake.carves.values()) * CELL**2
     assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
     assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
     waded = {row["step"]: row for row in report["events"] if row["phase"] == "wade"}
-    assert waded.keys() == {step_id(left.footprints[number]) for number in left.carves}
-    for number, carve in left.carves.items():
-        row, (low, high) = waded[step_id(left.footprints[number])], carve.window.corners(CELL)
+    assert waded.keys() == {step_id(record_of_bake.footprints[number]) for number in record_of_bake.carves}
+    for number, carve in record_of_bake.carves.items():
+        row, (low, high) = waded[step_id(record_of_bake.footprints[number])], carve.window.corners(CELL)
         assert carve.start_frame <= row["frame"] <= row["frame"] + 24 * row["duration_s"] <= carve.end_frame
         assert row["time_s"] == pytest.approx((row["frame"] - 1) / 24, abs=1e-5)
         assert (low < row["position"][:2]).all()
         assert (row["position"][:2] < high).all()
         assert row["surface"] == "snow"
-    again = record.load(record.dump(left)).carves
-    assert again.keys() == left.carves.keys()
-    for number, carve in left.carves.items():
+    again = record.load(record.dump(record_of_bake)).carves
+    assert again.keys() == record_of_bake.carves.keys()
+    for number, carve in record_of_bake.carves.items():
         assert np.array_equal(again[number].tile(again[number].rim, 20.5), carve.tile(carve.rim, 20.5))
         assert np.array_equal(again[number].tile(again[number].compression), carve.tile(carve.compression))
 
@@ -239,23 +239,23 @@ def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
     bpy.ops.softground.load_preset(name="Dry Sand")
     options = scene.softground
     options.cell_size, options.material.layer_depth, options.material.youngs_modulus = CELL, 0.6, 250e3
-    report, left = bake(scene)
+    report, record_of_bake = bake(scene)
     assert report["carved"][armature.name]["cut_m3"] > 1e-3
-    field = recompose(left.shaping)
+    field = recompose(record_of_bake.shaping)
     tiles = np.array(list(field.tiles))
     (column, row), (columns, rows) = tiles.min(axis=0) * TILE, (np.ptp(tiles, axis=0) + 1) * TILE
     window = Window(int(column), int(row), int(columns), int(rows))
     compression, rim = field.read(window)
     places = np.stack(np.meshgrid(*window.centres(CELL)), axis=-1)
-    lying = sum(carve.tile(carve.rim).sum() for carve in left.carves.values()) * CELL**2
+    lying = sum(carve.tile(carve.rim).sum() for carve in record_of_bake.carves.values()) * CELL**2
     volumes = report["carved"][armature.name]
     assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
     assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
-    lasts = [step.position[:2] for step in left.footprints[-2:]]
+    lasts = [step.position[:2] for step in record_of_bake.footprints[-2:]]
     at_rest = np.min([np.linalg.norm(places - last, axis=-1) for last in lasts], axis=0) > 0.7
-    for one, other, way in NEIGHBOURS:
-        slope = np.abs((rim - compression)[one] - (rim - compression)[other]) / (CELL * np.hypot(*way))
-        assert np.degrees(np.arctan(slope[at_rest[one] & at_rest[other]].max())) < 33.0
+    for first, other, way in NEIGHBOURS:
+        slope = np.abs((rim - compression)[first] - (rim - compression)[other]) / (CELL * np.hypot(*way))
+        assert np.degrees(np.arctan(slope[at_rest[first] & at_rest[other]].max())) < 33.0
 
 
 def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatch, tmp_path):
@@ -271,11 +271,11 @@ def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatc
     bpy.ops.softground.load_preset(name="Dry Sand")
     options.cell_size, options.debris = CELL, False
     options.pressure = "CENTRE_OF_PRESSURE"
-    left = bake(scene)[1]
-    assert {step.surface for step in left.footprints} == {"snow"}
-    assert left.carves.keys() == expected.carves.keys()
-    assert left.carves
-    for number, carve in left.carves.items():
+    record_of_bake = bake(scene)[1]
+    assert {step.surface for step in record_of_bake.footprints} == {"snow"}
+    assert record_of_bake.carves.keys() == expected.carves.keys()
+    assert record_of_bake.carves
+    for number, carve in record_of_bake.carves.items():
         whole = expected.carves[number]
         assert np.array_equal(carve.tile(carve.rim), whole.tile(whole.rim))
         assert np.array_equal(carve.tile(carve.compression), whole.tile(whole.compression))
@@ -283,14 +283,14 @@ def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatc
 
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     walker(scene, **DEEP)
-    _, left = bake(scene)
-    muted = min(left.carves)
-    name = step_id(left.footprints[muted])
-    heights = recompose(left.shaping)
+    _, record_of_bake = bake(scene)
+    muted = min(record_of_bake.carves)
+    name = step_id(record_of_bake.footprints[muted])
+    heights = recompose(record_of_bake.shaping)
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
     without = baked_ground.record_of(scene.softground.ground)
-    assert len(without.shaping) == len(left.shaping) - 2
-    assert without.carves.keys() == left.carves.keys()
+    assert len(without.shaping) == len(record_of_bake.shaping) - 2
+    assert without.carves.keys() == record_of_bake.carves.keys()
     wanted = settings.snapshot(scene)
     of = scene.softground.ground, scene.objects
     assert not staleness.reasons(*of, wanted)
@@ -304,9 +304,9 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
 def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     walker(scene, **DEEP)
     scene.softground.ground_margin = 2.0
-    _, left = bake(scene)
-    number, beside = min(left.carves), (0.0, 1.5)
-    step, carve = left.footprints[number], left.carves[number]
+    _, record_of_bake = bake(scene)
+    number, beside = min(record_of_bake.carves), (0.0, 1.5)
+    step, carve = record_of_bake.footprints[number], record_of_bake.carves[number]
     name = step_id(step)
 
     def edited(edits):
@@ -321,11 +321,13 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
         return rim - compression
 
     moved = edited({name: StepEdit(move_m=beside)})
-    there = moved.laid_carves[number]
-    assert np.abs(lying([there], beside) - lying([carve])).max() < 1e-6
-    assert there.tile(there.rim).sum() == pytest.approx(carve.tile(carve.rim).sum(), rel=1e-6)
+    moved_carve = moved.laid_carves[number]
+    assert np.abs(lying([moved_carve], beside) - lying([carve])).max() < 1e-6
+    assert moved_carve.tile(moved_carve.rim).sum() == pytest.approx(carve.tile(carve.rim).sum(), rel=1e-6)
     copied = edited({f"{name}+1": StepEdit(move_m=beside)})
-    assert np.array_equal(lying([copied.laid_carves[number + len(left.footprints)]], beside), lying([there], beside))
+    assert np.array_equal(
+        lying([copied.laid_carves[number + len(record_of_bake.footprints)]], beside), lying([moved_carve], beside)
+    )
     assert copied.laid_carves[number] is copied.carves[number]
     edited({name: StepEdit(move_m=(0.0, 0.1), shift_frames=4)})
     report, again = bake(scene)
@@ -362,11 +364,11 @@ def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
     records = []
     for is_on in (True, False):
         scene.softground.carve = is_on
-        report, left = bake(scene)
-        assert not left.carves
+        report, record_of_bake = bake(scene)
+        assert not record_of_bake.carves
         assert "carved" not in report
-        records.append(left)
-    on, off = (record.dump(left.with_about({})) for left in records)
+        records.append(record_of_bake)
+    on, off = (record.dump(record_of_bake.with_about({})) for record_of_bake in records)
     assert on == off
     assert max(step.max_depth_m for step in records[0].footprints) < 0.09
 
@@ -374,6 +376,6 @@ def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
 def test_without_sunk_feet_nothing_is_carved(scene):
     walker(scene, **DEEP)
     scene.softground.sink_feet = False
-    report, left = bake(scene)
-    assert not left.carves
+    report, record_of_bake = bake(scene)
+    assert not record_of_bake.carves
     assert "carved" not in report

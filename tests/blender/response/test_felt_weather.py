@@ -54,8 +54,8 @@ def footprints(scene):
     return record.load(bytes(baked_ground.stored_record(scene.softground.ground))).footprints
 
 
-def same(one, other):
-    return record.dump(record.BakeRecord(tuple(one), {})) == record.dump(record.BakeRecord(tuple(other), {}))
+def same(first, other):
+    return record.dump(record.BakeRecord(tuple(first), {})) == record.dump(record.BakeRecord(tuple(other), {}))
 
 
 def shown(scene, frame):
@@ -79,20 +79,20 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     set_to(opened, **SNOWFALL)
     assert bpy.ops.softground.bake() == {"FINISHED"}
     ground = opened.softground.ground
-    left = record.load(bytes(baked_ground.stored_record(ground)))
+    loaded = record.load(bytes(baked_ground.stored_record(ground)))
     obj = debris_object.of(ground)
     lies = positions(obj.data) + np.array(obj.matrix_world.translation)
     born = np.empty(len(obj.data.vertices), np.float32)
     obj.data.attributes["softground_birth"].data.foreach_get("value", born)
-    away = np.min([np.linalg.norm(lies[:, :2] - one.position[:2], axis=1) for one in left.edited], axis=0) > 0.3
-    weathering = weathering_of(felt_in(left.about["inputs"]), opened.softground.material.layer_depth)
+    away = np.min([np.linalg.norm(lies[:, :2] - each.position[:2], axis=1) for each in loaded.edited], axis=0) > 0.3
+    weathering = weathering_of(felt_in(loaded.about["inputs"]), opened.softground.material.layer_depth)
     level = np.array([weathering.level(frame) for frame in np.floor(born[away])])
     assert away.sum() > 5
     assert level.max() > 0.05
     assert np.mean(np.abs(lies[away, 2] - level) < 1e-3) > 0.95  # some lie at the tips of prints
     pieces = positions(obj.data)
     bake = jobs.run(step_edits.reading(opened))  # an edit throws in the same weather
-    jobs.run(step_edits.editing(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(opened, bake, {step_id(loaded.footprints[0]): StepEdit(mute=True)}))
     jobs.run(step_edits.editing(opened, bake, {}))
     assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
@@ -117,10 +117,10 @@ def test_steps_stand_on_the_snow_that_has_fallen(opened):
     assert not bake_report.stale_reasons(opened)
     after = footprints(opened)
     assert after[0].end_frame < 30
-    last = max(after, key=lambda one: one.start_frame)
+    last = max(after, key=lambda footprint: footprint.start_frame)
     deep = recompose([last]).read(last.window)[0]
     assert deep.min() < -0.1
-    plain = next(one for one in before if one.start_frame == last.start_frame)
+    plain = next(each for each in before if each.start_frame == last.start_frame)
     depth = recompose([plain]).read(plain.window)[0].max()
     # It lies that much below the snow that it was stepped on, from which on more fell beside it.
     surface = shown(opened, int(last.end_frame))
@@ -165,15 +165,15 @@ def keyed(scene, name, *keys):
 def test_keyed_weather_is_felt_as_it_is_at_the_time_of_each_step(opened):
     before = footprints(opened)
     set_to(opened, **SNOWFALL)
-    middle = sorted(one.start_frame for one in before)[-1] - 2
+    middle = sorted(each.start_frame for each in before)[-1] - 2
     keyed(opened, "Snowfall", (1, 0.0), (middle - 1, 0.0), (middle, 3.0))
     opened.softground.steps_feel_weather = True
     bpy.ops.softground.bake()
     inputs = baked_ground.load(opened.softground.ground)[1]["inputs"]["weather"]
     assert len(inputs["snowfall"]) == 257
     assert not [reason for reason in bake_report.stale_reasons(opened) if "settings" in reason]
-    for one, other in zip(before, footprints(opened), strict=True):
-        assert same([one], [other]) == (one.start_frame < middle)
+    for footprint, other in zip(before, footprints(opened), strict=True):
+        assert same([footprint], [other]) == (footprint.start_frame < middle)
     keyed(opened, "Snowfall", (middle, 2.0))
     assert "The settings have changed" in bake_report.stale_reasons(opened)
 
@@ -187,12 +187,12 @@ def test_an_edit_presses_again_in_the_weather_of_the_bake(opened):
     set_to(opened, Snowfall=0.0)
     bake = jobs.run(step_edits.reading(opened))
     again = bake.with_edits({step_id(after[-1]): StepEdit(turn_deg=1e-9)})
-    ((number, one),) = again.pressed_again.items()
-    difference = recompose([one], cell_size=one.cell_size).read(one.window) - recompose([after[number]]).read(
-        one.window
-    )
+    ((number, footprint),) = again.pressed_again.items()
+    difference = recompose([footprint], cell_size=footprint.cell_size).read(footprint.window) - recompose(
+        [after[number]]
+    ).read(footprint.window)
     assert np.abs(difference).max() < 1e-4
-    assert recompose([one]).read(one.window)[0].min() < -0.1
+    assert recompose([footprint]).read(footprint.window)[0].min() < -0.1
 
 
 def test_feet_stand_on_the_weathered_ground(opened):
@@ -202,7 +202,7 @@ def test_feet_stand_on_the_weathered_ground(opened):
         options.steps_feel_weather = felt
         set_to(opened, **SNOWFALL)
         assert bpy.ops.softground.bake() == {"FINISHED"}
-        step = max(footprints(opened), key=lambda one: one.start_frame)
+        step = max(footprints(opened), key=lambda footprint: footprint.start_frame)
         frame = int((step.start_frame + step.end_frame) / 2)
         opened.frame_set(frame)
         rig = options.characters[0].armature.evaluated_get(bpy.context.evaluated_depsgraph_get())

@@ -28,12 +28,12 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
         return leans[-1]
 
     @sliced
-    def kept(*arguments):
+    def recorded(*arguments):
         answers.extend((yield from responses_of.slices(*arguments)))
         return answers
 
     monkeypatch.setattr(pressed_shot, "leaning", watched)
-    monkeypatch.setattr(pressed_shot, "responses_of", kept)
+    monkeypatch.setattr(pressed_shot, "responses_of", recorded)
     responders.bake(scene)
     first, last = leans[0].leans[0], answers[0].response.lean
     assert np.abs(first).max() > NOTICEABLE_LEAN, "the body sways over its own prints"
@@ -50,17 +50,17 @@ def test_contacts_are_looked_for_once_with_a_ground_that_is_there(scene, monkeyp
     scene.softground.frame_end = 24
     scene.softground.ground = plane(scene) if given else None
     bpy.context.view_layer.update()
-    found = []
+    leans = []
 
     @sliced
     def counted(motion, terrain):
-        found.append(motion.name)
+        leans.append(motion.name)
         return (yield from detect_contacts.slices(motion, terrain))
 
     monkeypatch.setattr(estimate, "detect_contacts", counted)
     monkeypatch.setattr(ground_plan, "detect_contacts", counted)
     bpy.ops.softground.bake()
-    assert len(found) == times
+    assert len(leans) == times
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, mon
     bpy.ops.softground.add_character()
     scene.softground.tilt.strength = 1.0
     scene.softground.material.youngs_modulus = 6e4
-    passes, found = [], []
+    passes, leans = [], []
     leaning, free_loads = pressed_shot.leaning, estimate.free_loads
 
     @sliced
@@ -81,11 +81,11 @@ def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, mon
         return passes[-1]
 
     def counted(motion, *others, **options):
-        found.append(motion.name)
+        leans.append(motion.name)
         return free_loads(motion, *others, **options)
 
     monkeypatch.setattr(pressed_shot, "leaning", watched)
     monkeypatch.setattr(estimate, "free_loads", counted)
     responders.bake(scene)
     assert len(passes) > 1
-    assert found == ["Sphere"]
+    assert leans == ["Sphere"]

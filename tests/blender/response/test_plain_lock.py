@@ -73,16 +73,17 @@ def check(scene, name):
     shot, touching = read(scene)
     motion = shot.motions[0]
     answers = {"source": None, "clean": clean(motion, touching, shot.terrain), "plain": plain_lock(motion, touching)}
-    told = {
+    measures = {
         key: judged(responding(motion, answer) if answer else motion, touching, shot.terrain)
         for key, answer in answers.items()
     }
     print(
-        f"\n{name}: " + "; ".join(f"{key} {s:.2f} mm, {h:.0f} m/s³, {k:.0f} rad/s³" for key, (s, h, k) in told.items())
+        f"\n{name}: "
+        + "; ".join(f"{key} {s:.2f} mm, {h:.0f} m/s³, {k:.0f} rad/s³" for key, (s, h, k) in measures.items())
     )
-    assert told["clean"][0] < told["plain"][0] + 1.0, "no more slide"
-    assert told["clean"][1] < told["plain"][1], "less jerk of the hips"
-    assert told["clean"][2] < told["plain"][2], "less jerk of the knees"
+    assert measures["clean"][0] < measures["plain"][0] + 1.0, "no more slide"
+    assert measures["clean"][1] < measures["plain"][1], "less jerk of the hips"
+    assert measures["clean"][2] < measures["plain"][2], "less jerk of the knees"
 
 
 def test_a_walk_that_slides_jerks_less_than_under_the_plain_lock(floor_walk):  # noqa: F811

@@ -145,7 +145,7 @@ def test_feet_sink_by_themselves(first_walk):
     result = jobs.run(bake_job.bake(first_walk))
     assert has_layer(options.characters[0].armature)
     assert floating_mm(first_walk) < 2.0
-    assert not [found for found in result.report["self_check"] if found["code"] == "feet_not_sunk"]
+    assert not [finding for finding in result.report["self_check"] if finding["code"] == "feet_not_sunk"]
     assert bake_report.stale_reasons(first_walk) == ()
     options.sink_feet = False
     assert bake_report.stale_reasons(first_walk)
@@ -158,7 +158,7 @@ def test_a_rig_that_takes_no_layer_is_named_in_a_line_and_prints_all_the_same(sc
     assert scene.softground.sink_feet
     result = jobs.run(bake_job.bake(scene))
     assert result.footprints
-    (said,) = [found for found in result.report["self_check"] if found["code"] == "feet_not_sunk"]
+    (said,) = [finding for finding in result.report["self_check"] if finding["code"] == "feet_not_sunk"]
     assert "'Walker' is linked" in said["message"]
     assert not has_layer(armature)
     assert bake_report.stale_reasons(scene) == ()

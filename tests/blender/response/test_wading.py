@@ -24,13 +24,13 @@ def joints(scene, armature):
 def straightest_knees(scene, steps):
     """Least flexion of the standing knee in the middle third of each contact far from the ends [degrees]."""
     flexion = dict(zip("LR", responders.knee_angles(scene).T, strict=True))
-    found = []
+    heights = []
     for step in steps:
         start, end = step["frame_start"], step["frame_end"]
         if start >= WALKS.start and end <= WALKS.stop:
             middle = np.arange(np.ceil((2 * start + end) / 3), np.floor((start + 2 * end) / 3) + 1).astype(int)
-            found.append(flexion[step["contact"][-1]][middle - 1].min())
-    return np.array(found)
+            heights.append(flexion[step["contact"][-1]][middle - 1].min())
+    return np.array(heights)
 
 
 @pytest.mark.parametrize(

@@ -316,8 +316,8 @@ def forged_by_member(stored):
             for member, content in members.items():
                 for _ in range(copies if member == name else 1):
                     target.writestr(member, change if member == name else content)
-            for one in extra:
-                target.writestr(one, bytes(1000))
+            for junk in extra:
+                target.writestr(junk, bytes(1000))
         return buffer.getvalue()
 
     changed = st.sampled_from(sorted(members)).flatmap(
@@ -398,10 +398,10 @@ def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
     ground = scene.softground.ground
     mesh = ground_mesh.mesh_of(baked_ground.display_mesh_of(ground))
     content = bytes(mesh[ground_mesh.RECORD])
-    left = record.load(content)
-    (edited,) = left.edits.values()
-    assert all((left.throws, left.thrown, left.about["inputs"]["weather"], edited.mesh))
-    moved = {step_id(left.footprints[1]): StepEdit(move_m=(0.1, 0.0), shift_frames=2)}
+    loaded = record.load(content)
+    (edited,) = loaded.edits.values()
+    assert all((loaded.throws, loaded.thrown, loaded.about["inputs"]["weather"], edited.mesh))
+    moved = {step_id(loaded.footprints[1]): StepEdit(move_m=(0.1, 0.0), shift_frames=2)}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         text = archive.read("record.json")
 
@@ -417,8 +417,13 @@ def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
             weather.add(ground)
         bpy.context.view_layer.update()
 
-    found = [("material", {"crust_stress": None}), ("painted", ""), ("pressure", "x"), ("frames", [float("nan"), 9])]
-    for name, value in found:  # which the marathon did
+    bad_values = [
+        ("material", {"crust_stress": None}),
+        ("painted", ""),
+        ("pressure", "x"),
+        ("frames", [float("nan"), 9]),
+    ]
+    for name, value in bad_values:  # which the marathon did
         forged = json.loads(text)
         inputs = forged["about"]["inputs"]
         inputs[name] = inputs[name] | value if isinstance(value, dict) else value
@@ -512,19 +517,19 @@ def test_no_stored_property_makes_a_traceback(count, forgeable):
     scene, mesh, action = forgeable
     names = [(mesh, name) for name in ground_mesh.PROPERTIES]
     names += [(action, name) for name in (response_job.ROOT_CONTROL, response_job.SPEED, response_job.WORST)]
-    kept = {(owner.name, name): owner[name] for owner, name in names if owner.get(name) is not None}
-    kept = {
+    values = {(owner.name, name): owner[name] for owner, name in names if owner.get(name) is not None}
+    values = {
         key: value
         if isinstance(value, str | float)
         else value.to_dict()
         if hasattr(value, "to_dict")
         else value.to_list()
-        for key, value in kept.items()
+        for key, value in values.items()
     }
 
     def check(forged):
         (owner, name), value = forged
-        before = kept.get((owner.name, name))
+        before = values.get((owner.name, name))
         owner[name] = value
         try:
             assert isinstance(bake_report.stale_reasons(scene), tuple)

@@ -58,20 +58,20 @@ def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, 
         shot.write_bytes(old)
         receipt.unlink(missing_ok=True)
         kill_at(whole * (chance.uniform(0.6, 1.1) if attempt % 4 else chance.uniform(0.0, 1.0)), *options)
-        found = checksum(shot)
-        if found == before:
+        digest = checksum(shot)
+        if digest == before:
             seen["old"] += 1
             continue
         seen["new"] += 1
         if receipt.exists():  # which comes last
-            assert found == json.loads(receipt.read_text())["wrote"][str(shot.resolve())], f"attempt {attempt}"
+            assert digest == json.loads(receipt.read_text())["wrote"][str(shot.resolve())], f"attempt {attempt}"
         else:
             bpy.ops.wm.open_mainfile(filepath=str(shot))
             assert ground_mesh.is_baked(bpy.context.scene.softground.ground), f"attempt {attempt}"
     print(seen)
     assert seen["old"]
-    left = [path for path in tmp_path.iterdir() if path not in (shot, receipt)]
-    assert all(path.name.startswith(".") and ".partial" in path.name for path in left)
+    remains = [path for path in tmp_path.iterdir() if path not in (shot, receipt)]
+    assert all(path.name.startswith(".") and ".partial" in path.name for path in remains)
 
 
 KILLED_WHILE_SAVING = """
@@ -109,19 +109,19 @@ def test_a_bake_killed_within_its_save_leaves_whole_files_and_a_receipt_that_is_
     for attempt in range(kills):
         old = {name: path.read_bytes() for name, path in places.items() if path.exists()}
         step = 2 * attempt % 25 + 1  # so that few attempts reach the renames too
-        told = [step, chance.choice([1e-6, chance.uniform(0, 0.1)])]
-        command = [sys.executable, "-c", KILLED_WHILE_SAVING, *told, "bake", shot, "--progress=none", *options]
+        order = [step, chance.choice([1e-6, chance.uniform(0, 0.1)])]
+        command = [sys.executable, "-c", KILLED_WHILE_SAVING, *order, "bake", shot, "--progress=none", *options]
         done = subprocess.run(list(map(str, command)), cwd=command_line.ROOT, capture_output=True, check=False)
         assert done.returncode in (0, -signal.SIGALRM), done.stderr
         ended += done.returncode == 0
-        found = {name: path.read_bytes() for name, path in places.items() if path.exists()}
-        if found.get("baked.blend") != old.get("baked.blend"):
+        contents = {name: path.read_bytes() for name, path in places.items() if path.exists()}
+        if contents.get("baked.blend") != old.get("baked.blend"):
             bpy.ops.wm.open_mainfile(filepath=str(places["baked.blend"]))
             assert ground_mesh.is_baked(bpy.context.scene.softground.ground)
-        if "report.json" in found:
-            assert json.loads(found["report.json"])["steps"]
-        if found.get("receipt.json") != old.get("receipt.json"):
-            wrote = json.loads(found["receipt.json"])["wrote"]
+        if "report.json" in contents:
+            assert json.loads(contents["report.json"])["steps"]
+        if contents.get("receipt.json") != old.get("receipt.json"):
+            wrote = json.loads(contents["receipt.json"])["wrote"]
             assert wrote == {str(places[name]): checksum(places[name]) for name in ("baked.blend", "report.json")}
         for path in places.values():
             remove_leftovers(path)

@@ -57,8 +57,8 @@ def test_what_the_user_makes_after_the_bake_under_such_a_name_stays_and_is_told_
     ground.data.attributes.new("softground_mine", "FLOAT", "POINT")
     assert f"called '{own_data.SOLE}'" in refusal(bpy.ops.softground.bake)
     bpy.ops.softground.clear_bake()
-    left = [name for name in ground.data.attributes.keys() if name.startswith("softground")]  # noqa: SIM118
-    assert left == [own_data.SOLE, playback.nodes.LAST_HEIGHT, "softground_mine"]
+    remains = [name for name in ground.data.attributes.keys() if name.startswith("softground")]  # noqa: SIM118
+    assert remains == [own_data.SOLE, playback.nodes.LAST_HEIGHT, "softground_mine"]
 
 
 def test_attributes_of_the_users_come_along_to_the_copy_whatever_they_are_called(short_walk):

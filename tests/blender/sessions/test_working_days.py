@@ -49,12 +49,15 @@ class Day:
         chance = random.Random(self.seed)
         for hour in range(hours):
             deed = chance.choice((self.key, self.strip, self.mute, self.rename, self.copy, self.save, self.undo))
-            luck, own = chance.random(), chance.choice(("bake", "clean_feet", "clear_bake", "remove_response", "bake"))
+            luck, action = (
+                chance.random(),
+                chance.choice(("bake", "clean_feet", "clear_bake", "remove_response", "bake")),
+            )
             bpy.context.scene.frame_set(1 + int(luck * FRAMES))
             deed(luck, hour)
             if self.with_add_on:
                 bpy.context.view_layer.objects.active = self.rig
-                operator = getattr(bpy.ops.softground, own)
+                operator = getattr(bpy.ops.softground, action)
                 if operator.poll():
                     self.press(operator)
         bpy.context.scene.frame_set(1)
@@ -114,7 +117,7 @@ class Day:
         layers = {obj.animation_data.action.name for obj in helpers if obj.animation_data}
         for obj in bpy.data.objects:  # what the add-on adds to a rig is not the animator's
             for owner in (obj, *(obj.pose.bones if obj.pose else ())):
-                for constraint in [one for one in owner.constraints if is_own(one)]:
+                for constraint in [each for each in owner.constraints if is_own(each)]:
                     owner.constraints.remove(constraint)
             for kind in KINDS:
                 obj.pop(kind, None)

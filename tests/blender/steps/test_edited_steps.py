@@ -51,13 +51,13 @@ def stored(ground):
 
 def test_edits_from_a_file_are_in_the_ground_the_report_and_the_next_bake(shot):
     folder, plain = shot
-    one, two, three = (step["id"] for step in plain["steps"][1:4])
-    edits = {one: {"strength": 0.5}, two: {"move_m": [0.0, 0.5], "turn_deg": 30.0}, three: {"mute": True}}
+    first, two, three = (step["id"] for step in plain["steps"][1:4])
+    edits = {first: {"strength": 0.5}, two: {"move_m": [0.0, 0.5], "turn_deg": 30.0}, three: {"mute": True}}
     assert bake(folder, edits) == 0
     report = json.loads((folder / "report.json").read_text())
     before, after = ({step["id"]: step for step in steps["steps"]} for steps in (plain, report))
     assert {name: step["edit"] for name, step in after.items() if "edit" in step} == edits
-    assert after[one]["max_depth_m"] == pytest.approx(0.5 * before[one]["max_depth_m"], rel=1e-3)
+    assert after[first]["max_depth_m"] == pytest.approx(0.5 * before[first]["max_depth_m"], rel=1e-3)
     np.testing.assert_allclose(np.subtract(after[two]["position"], before[two]["position"])[:2], (0.0, 0.5), atol=0.02)
     assert [name for name, step in after.items() if step.get("left_out")] == [three]
     assert report["totals"]["steps"] == plain["totals"]["steps"] - 1
@@ -71,7 +71,7 @@ def test_edits_from_a_file_are_in_the_ground_the_report_and_the_next_bake(shot):
     again, _ = baked_ground.load(ground)  # what was edited stays so
     assert list(map(step_id, again)) == list(map(step_id, steps))
     assert len(again) == plain["totals"]["steps"] - 1
-    np.testing.assert_allclose([one.position for one in again], [one.position for one in steps], atol=1e-3)
+    np.testing.assert_allclose([each.position for each in again], [step.position for step in steps], atol=1e-3)
 
 
 def test_edits_that_are_reset_leave_the_bytes_of_a_bake_without(shot):
@@ -80,8 +80,8 @@ def test_edits_that_are_reset_leave_the_bytes_of_a_bake_without(shot):
     assert bake(folder, {plain["steps"][2]["id"]: {"move_m": [0.1, 0.2]}}) == 0
     ground = ground_in(folder / "edited.blend")
     assert stored(ground) != first
-    left = record.load(stored(ground))
-    assert {step_id(step): left.pressed_again.get(n) is not None for n, step in enumerate(left.footprints)}[
+    loaded = record.load(stored(ground))
+    assert {step_id(step): loaded.pressed_again.get(n) is not None for n, step in enumerate(loaded.footprints)}[
         plain["steps"][2]["id"]
     ]
     assert bake(folder, {}) == 0
@@ -93,11 +93,11 @@ def test_edits_go_with_a_character_that_gets_another_name(shot):
     name = plain["steps"][2]["id"]
     assert bake(folder, {name: {"move_m": [0.1, 0.2]}}) == 0
     ground = ground_in(folder / "edited.blend")
-    before = [one.position for one in baked_ground.load(ground)[0]]
+    before = [each.position for each in baked_ground.load(ground)[0]]
     bpy.data.objects["Walker"].name = "Ann"
     bpy.ops.softground.bake()
     assert baked_ground.edits_of(ground).keys() == {name.replace("Walker", "Ann")}
-    np.testing.assert_allclose([one.position for one in baked_ground.load(ground)[0]], before, atol=1e-3)
+    np.testing.assert_allclose([each.position for each in baked_ground.load(ground)[0]], before, atol=1e-3)
 
 
 def test_an_edit_without_a_step_is_kept_and_named(shot):

@@ -30,11 +30,11 @@ def contact_bones(scene, armature, steps):
     """World matrices of the bones of some steps' soles, in the middle of the contact."""
     mapping = responders.mapping_of(scene.softground.characters[0])
     bones = {source.name: source.bone for source in mapping.soles}
-    found = []
+    gaps = []
     for step in steps:
         frame = round((step["frame_start"] + step["frame_end"]) / 2)
-        found.append(responders.world_matrices(scene, armature, [bones[step["contact"]]], [frame])[0, 0])
-    return np.array(found)
+        gaps.append(responders.world_matrices(scene, armature, [bones[step["contact"]]], [frame])[0, 0])
+    return np.array(gaps)
 
 
 def test_the_rig_stands_in_its_moved_print_and_in_all_others_as_before(rig):
@@ -45,7 +45,7 @@ def test_the_rig_stands_in_its_moved_print_and_in_all_others_as_before(rig):
     before = contact_bones(scene, rig, steps)
     moved = len(steps) // 2
     report = bake(scene, {steps[moved]["id"]: StepEdit(move_m=MOVE, turn_deg=TURN)}).report
-    assert not [one for one in report["self_check"] if one["code"] == "step_out_of_reach"]
+    assert not [finding for finding in report["self_check"] if finding["code"] == "step_out_of_reach"]
     carry = contact_bones(scene, rig, steps) @ np.linalg.inv(before)
     went = np.einsum("sij,sj->si", carry, pivots)[:, :2] - pivots[:, :2]
     np.testing.assert_allclose(went[moved], MOVE, atol=2e-3)
@@ -75,6 +75,6 @@ def test_a_step_beyond_the_leg_is_said(scene):
     set_up(armature)
     name = bake(scene).report["steps"][2]["id"]
     report = bake(scene, {name: StepEdit(move_m=(0.0, 2.0))}).report
-    (said,) = [one for one in report["self_check"] if one["code"] == "step_out_of_reach"]
+    (said,) = [finding for finding in report["self_check"] if finding["code"] == "step_out_of_reach"]
     assert name in said["message"]
     assert "% of the way" in said["message"]

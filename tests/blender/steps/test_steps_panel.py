@@ -14,8 +14,7 @@ from mathutils import Matrix
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_report, step_edits, step_soles
 from softground_addon.blender.baking.step_preview import StepPreview
-from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.operators import baked_steps
+from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.panels import steps_panel
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.blender.state import state
@@ -66,9 +65,9 @@ def test_a_step_is_chosen_muted_changed_and_reset(baked):
     bpy.ops.softground.mute_step()
     assert stored(baked) == before
     bpy.ops.softground.change_step(strength=0.5, move=(0.0, 0.4), turn=0.5)
-    there = step.baked.position + np.array([0.0, 0.4, 0.0])
+    target = step.baked.position + np.array([0.0, 0.4, 0.0])
     assert under(baked, step.baked.position) < 2e-3
-    assert under(baked, there) == pytest.approx(depth / 2, rel=0.3)
+    assert under(baked, target) == pytest.approx(depth / 2, rel=0.3)
     assert not bake_report.stale_reasons(baked)
     assert baked_ground.edits_of(baked.softground.ground)[step.name].move_m == (0.0, 0.4)
     bpy.ops.softground.reset_step()
@@ -125,15 +124,15 @@ def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
 
 def test_several_steps_are_chosen_and_changed_together_in_what_was_changed(baked):
     before = stored(baked)
-    one, two, three = baked_steps.of(baked.softground.ground)[:3]
-    bpy.ops.softground.change_step(step=one.name, strength=0.5)
-    bpy.ops.softground.choose_step(step=one.name)
+    first, two, three = baked_steps.of(baked.softground.ground)[:3]
+    bpy.ops.softground.change_step(step=first.name, strength=0.5)
+    bpy.ops.softground.choose_step(step=first.name)
     for step in (two, three, two):  # the last one no more
         bpy.ops.softground.choose_step(step=step.name, extend=True)
-    assert [step.name for step in baked_steps.chosen(baked.softground.ground)] == [three.name, one.name]
+    assert [step.name for step in baked_steps.chosen(baked.softground.ground)] == [three.name, first.name]
     bpy.ops.softground.change_step(scale=1.2)
     edits = baked_ground.edits_of(baked.softground.ground)
-    assert edits == {one.name: StepEdit(strength=0.5, scale=1.2), three.name: StepEdit(scale=1.2)}
+    assert edits == {first.name: StepEdit(strength=0.5, scale=1.2), three.name: StepEdit(scale=1.2)}
     bpy.ops.softground.mute_step()
     assert [step.footprint is None for step in baked_steps.of(baked.softground.ground)[:3]] == [True, False, True]
     bpy.ops.softground.reset_step()
@@ -155,7 +154,7 @@ def test_a_copy_that_is_deleted_leaves_the_others_selected(baked, copy_is_last):
     choose(*((step, copy) if copy_is_last else (copy, step)))
     bpy.ops.softground.reset_step()
     assert (
-        [one.name for one in baked_steps.chosen(baked.softground.ground)]
+        [each.name for each in baked_steps.chosen(baked.softground.ground)]
         == [baked_steps.chosen(baked.softground.ground)[0].name]
         == [step.name]
     )
@@ -171,16 +170,19 @@ def test_nothing_selected_is_said_plainly(baked):
 
 
 def test_the_timeline_stays_while_a_step_is_taken_out_of_the_selection(baked):
-    one, two = baked_steps.of(baked.softground.ground)[:2]
-    choose(one, two)
+    first, two = baked_steps.of(baked.softground.ground)[:2]
+    choose(first, two)
     baked.frame_set(22)
-    for step, left in ((two, [one.name]), (one, [])):
+    for step, remaining in ((two, [first.name]), (first, [])):
         assert bpy.ops.softground.choose_step(step=step.name, extend=True) == {"FINISHED"}
-        assert ([step.name for step in baked_steps.chosen(baked.softground.ground)], baked.frame_current) == (left, 22)
-    choose(one)
-    assert baked.frame_current == one.there_from
+        assert ([step.name for step in baked_steps.chosen(baked.softground.ground)], baked.frame_current) == (
+            remaining,
+            22,
+        )
+    choose(first)
+    assert baked.frame_current == first.there_from
     assert bpy.ops.softground.choose_step(step="gone", extend=True) == {"CANCELLED"}
-    assert session.chosen_steps() == (one.name,)
+    assert session.chosen_steps() == (first.name,)
 
 
 def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
@@ -244,8 +246,8 @@ def test_a_step_takes_the_sole_of_another_foot(baked):
 
 def test_a_step_takes_the_sole_of_a_mesh(baked):
     before, shoe = stored(baked), plate(baked)
-    one, two = baked_steps.of(baked.softground.ground)[1:3]
-    bpy.ops.softground.change_step(step=one.name, sole="Shoe")
+    first, two = baked_steps.of(baked.softground.ground)[1:3]
+    bpy.ops.softground.change_step(step=first.name, sole="Shoe")
     shod = baked_steps.of(baked.softground.ground)[1]
     assert np.ptp(shod.outline()[:, :2], axis=0) == pytest.approx((0.1, 0.4), abs=0.05)  # it walks along -y
     assert shod.footprint.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
@@ -326,7 +328,7 @@ def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
 
 
 def reset_button(scene):
-    """Whether the panel's button that resets the selected steps is enabled, and its icon."""
+    """True if the panel's button that resets the selected steps is enabled, and its icon."""
     rows, layout = [], MagicMock()
     layout.row.side_effect = lambda **_: rows.append(MagicMock()) or rows[-1]
     steps_panel.SOFTGROUND_PT_steps.draw(MagicMock(fields=lambda: layout), SimpleNamespace(scene=scene))
@@ -335,10 +337,10 @@ def reset_button(scene):
 
 
 def test_reset_is_enabled_while_any_selected_step_is_edited(baked):
-    one, two = baked_steps.of(baked.softground.ground)[:2]
-    choose(one, two)
+    first, two = baked_steps.of(baked.softground.ground)[:2]
+    choose(first, two)
     assert not reset_button(baked)[0]
-    bpy.ops.softground.mute_step(step=one.name)
+    bpy.ops.softground.mute_step(step=first.name)
     assert reset_button(baked) == (True, "LOOP_BACK")
     bpy.ops.softground.duplicate_step(step=two.name)
     copy = baked_steps.chosen(baked.softground.ground)[0]

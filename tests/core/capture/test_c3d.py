@@ -26,7 +26,7 @@ def points(*, seed: int = 0) -> np.ndarray:
 def plate(kind: int) -> dict[str, np.ndarray]:
     origin = [120.0, 200.0, -41.0] if kind == 3 else [3.0, -2.0, -41.0]
     channels = 8 if kind == 3 else 6
-    told = {
+    header = {
         "USED": np.array([1]),
         "TYPE": np.array([kind]),
         "ZERO": np.array([1, 0]),
@@ -35,8 +35,8 @@ def plate(kind: int) -> dict[str, np.ndarray]:
         "CHANNEL": np.arange(1, channels + 1)[:, None],
     }
     if kind == 4:
-        told["CAL_MATRIX"] = (2 * np.eye(6) + 0.05 * np.random.default_rng(1).normal(size=(6, 6)))[:, :, None]
-    return told
+        header["CAL_MATRIX"] = (2 * np.eye(6) + 0.05 * np.random.default_rng(1).normal(size=(6, 6)))[:, :, None]
+    return header
 
 
 def signals(kind: int) -> np.ndarray:

@@ -59,10 +59,10 @@ def test_what_is_brought_or_picked_up_is_left_shed_or_still_carried_whatever_a_s
         giving, carried = carry(meetings, MUD, AREAS, brought=chance.choice([0.0, chance.random()]))
         taken = carried.brought + carried.picked_up
         assert taken == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
-        left = sum(
-            film @ (AREAS * one.shares) for film, one in zip(giving, meetings, strict=True) if one.shares is not None
+        remaining = sum(
+            film @ (AREAS * each.shares) for film, each in zip(giving, meetings, strict=True) if each.shares is not None
         )
-        assert carried.left_behind == pytest.approx(left, abs=1e-12)
+        assert carried.left_behind == pytest.approx(remaining, abs=1e-12)
         assert carried.on_soles >= 0
 
 

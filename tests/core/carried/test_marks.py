@@ -39,8 +39,8 @@ def marks(surface="mud", muted=(), wet=None, **options):
     return marks_of([loads], steps, terrain, surface=surface, **options)
 
 
-def mass_of_steps(found):
-    return np.bincount(found.step, found.mass * found.area)
+def mass_of_steps(laid_marks):
+    return np.bincount(laid_marks.step, laid_marks.mass * laid_marks.area)
 
 
 @pytest.mark.parametrize("force", [5.0, 800.0, 3000.0])
@@ -75,21 +75,21 @@ def test_a_sole_over_an_edge_leaves_its_mark_on_the_floor_alone():
     grid = sole_grid(sole, pose(np.zeros((1, 3))))
     hard = MeshTerrain.joined([slab((-1, 0.05), (-1, 1), 0.0), slab((0.05, 1), (-1, 1), -0.2)])
     terrain = HardOnSoft(FlatTerrain(-1.0), hard, Reach.of(np.array([[0.0, 0.0, 0.5]]), 1.0))
-    found = laid(grid, pose(np.zeros((3, 1, 3))), np.full(3, 700.0), terrain, 0.02)
-    corners = found.position[found.faces]
-    assert len(found.faces)
+    floor_print = laid(grid, pose(np.zeros((3, 1, 3))), np.full(3, 700.0), terrain, 0.02)
+    corners = floor_print.position[floor_print.faces]
+    assert len(floor_print.faces)
     assert corners[..., 0].max() < 0.05 + 1e-9
     assert corners[..., 2] == pytest.approx(CLEARANCE)
-    assert found.pressure @ grid.area == pytest.approx(700.0, rel=0.1)
+    assert floor_print.pressure @ grid.area == pytest.approx(700.0, rel=0.1)
 
 
 def test_a_walk_out_of_mud_leaves_marks_that_fade_and_every_gram_is_booked():
-    found = marks(shed={0: 0.01 / 1700.0, 3: 0.02 / 1700.0})
-    of_steps = mass_of_steps(found)
+    laid_marks = marks(shed={0: 0.01 / 1700.0, 3: 0.02 / 1700.0})
+    of_steps = mass_of_steps(laid_marks)
     assert len(of_steps) >= 4
     for foot in (of_steps[: len(of_steps) // 2], of_steps[len(of_steps) // 2 :]):
         assert (np.diff(foot[1:]) < 0).all()  # the first is half on the edge
-    carried = found.carried
+    carried = laid_marks.carried
     assert of_steps.sum() == pytest.approx(carried.left_behind, abs=1e-9)
     assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
     assert carried.shed == pytest.approx(0.03)
@@ -98,17 +98,17 @@ def test_a_walk_out_of_mud_leaves_marks_that_fade_and_every_gram_is_booked():
 
 def test_marks_lie_on_the_floor_under_the_feet_that_press_them():
     loads, _, _ = crossing()
-    found = marks()
-    assert found.position[:, 2] == pytest.approx(FLOOR + CLEARANCE)
-    for number in np.unique(found.step):
-        of_step = found.step == number
-        along, across, _ = found.sole[of_step].T
-        place = found.position[of_step]
+    laid_marks = marks()
+    assert laid_marks.position[:, 2] == pytest.approx(FLOOR + CLEARANCE)
+    for number in np.unique(laid_marks.step):
+        of_step = laid_marks.step == number
+        along, across, _ = laid_marks.sole[of_step].T
+        place = laid_marks.position[of_step]
         assert np.polyfit(along, place[:, 0], 1)[0] == pytest.approx(1.0, abs=0.06)
         assert np.polyfit(across, place[:, 1], 1)[0] == pytest.approx(1.0, abs=0.03)
         heel, toes = along < 0.05, along > 0.22
-        assert found.birth[of_step][heel].min() < found.birth[of_step][toes].min()
-    assert found.birth.min() >= loads.motion.frames[0]
+        assert laid_marks.birth[of_step][heel].min() < laid_marks.birth[of_step][toes].min()
+    assert laid_marks.birth.min() >= loads.motion.frames[0]
 
 
 def test_a_sole_that_slides_on_leaves_a_mark_for_each_of_its_lengths():
@@ -148,17 +148,17 @@ def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():
 @pytest.mark.parametrize("liquid", LIQUIDS)
 def test_soles_that_step_into_a_puddle_carry_it_on_and_leave_no_mark_in_it(liquid):
     puddle = slab((3.0, 4.2), (-1, 1), FLOOR)
-    found = marks("sand", wet={liquid: puddle})
-    film, of_steps = LIQUIDS[liquid].carried, mass_of_steps(found)
-    assert found.floors.kind == liquid
+    laid_marks = marks("sand", wet={liquid: puddle})
+    film, of_steps = LIQUIDS[liquid].carried, mass_of_steps(laid_marks)
+    assert laid_marks.floors.kind == liquid
     assert len(of_steps) >= 3
     assert (np.diff(of_steps) < 0).all()
-    inside = (found.position[:, 0] > 3.0) & (found.position[:, 0] < 4.2)
-    assert np.bincount(found.step, inside, len(of_steps)).max() < 0.5 * np.bincount(found.step).max()
-    carried = found.carried
+    inside = (laid_marks.position[:, 0] > 3.0) & (laid_marks.position[:, 0] < 4.2)
+    assert np.bincount(laid_marks.step, inside, len(of_steps)).max() < 0.5 * np.bincount(laid_marks.step).max()
+    carried = laid_marks.carried
     assert of_steps.sum() == pytest.approx(carried.left_behind, abs=1e-9)
     assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
-    assert found.mass.max() <= film.most * film.deposited
+    assert laid_marks.mass.max() <= film.most * film.deposited
     assert marks("sand") is None
 
 
@@ -174,12 +174,12 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
     whole = marks()
     for muted in ((0,), (0, 1, 2), range(len(steps)), ()):
         edited = [replace(step, footprint=None) if step.index in muted else step for step in steps]
-        found, anew = whole.with_steps(edited, {1: 1e-5}), marks(muted=muted, shed={1: 1e-5})
-        assert found.mass == pytest.approx(anew.mass, abs=1e-12)
-        carried = found.carried
+        updated, anew = whole.with_steps(edited, {1: 1e-5}), marks(muted=muted, shed={1: 1e-5})
+        assert updated.mass == pytest.approx(anew.mass, abs=1e-12)
+        carried = updated.carried
         assert carried == anew.carried
         assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
-        assert mass_of_steps(found).sum() == pytest.approx(carried.left_behind, abs=1e-9)
+        assert mass_of_steps(updated).sum() == pytest.approx(carried.left_behind, abs=1e-9)
 
 
 @pytest.mark.parametrize("ground", ["sand", "snow"])
@@ -187,6 +187,6 @@ def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
     loads, footprints, terrain = crossing()
     steps = steps_of([replace(step, surface="mud") for step in footprints], {}, {}, {})
     muted = [replace(step, footprint=None) for step in steps]
-    found = marks_of([loads], muted, terrain, surface=ground)
-    assert not found.mass.any()
-    assert found.with_steps(steps, {}).mass == pytest.approx(marks().mass)
+    laid_marks = marks_of([loads], muted, terrain, surface=ground)
+    assert not laid_marks.mass.any()
+    assert laid_marks.with_steps(steps, {}).mass == pytest.approx(marks().mass)

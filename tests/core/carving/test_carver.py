@@ -34,7 +34,7 @@ def block(cells, low, high, bottom):
 
 def steepest(surface):
     """Steepest slope between neighbouring cells [degrees]."""
-    ways = [np.abs(surface[one] - surface[other]).max() / np.hypot(*way) for one, other, way in NEIGHBOURS]
+    ways = [np.abs(surface[each] - surface[other]).max() / np.hypot(*way) for each, other, way in NEIGHBOURS]
     return np.degrees(np.arctan(max(ways) / CELL))
 
 
@@ -153,7 +153,7 @@ def test_a_wall_falls_that_is_higher_than_its_cohesion_holds():
     cells, walls = level(), walls_of("mud")
     cells.cut(block(cells, (25, 25), (35, 35), -walls.strength - 0.2), NOBODY, 1.0)
     cells.slide(walls, np.zeros_like(cells.closed), (0, 0), 4 * SWEEPS_TO_REST)
-    highest = max(np.abs(cells.surface[one] - cells.surface[other]).max() for one, other, _ in NEIGHBOURS)
+    highest = max(np.abs(cells.surface[each] - cells.surface[other]).max() for each, other, _ in NEIGHBOURS)
     assert highest < walls.strength + 0.02
     assert cells.loose.sum() == pytest.approx(cells.cut_height - cells.packed, rel=1e-9), "what fell was cut"
     assert cells.surface.sum() == pytest.approx(-cells.packed, rel=1e-9)

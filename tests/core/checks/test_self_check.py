@@ -41,7 +41,7 @@ def stands(skin=PLACES, soles=PLACES):
     return replace(loads, motion=replace(motion, skin=skin_at(frames, skin), soles=seen, joints=moves))
 
 
-def found(loads, terrain=None, cell_size=0.01):
+def findings_of(loads, terrain=None, cell_size=0.01):
     """Findings by their codes."""
     terrain = terrain or FlatTerrain()
     _, footprints = pressed(loads, SNOW, cell_size, terrain)
@@ -51,12 +51,12 @@ def found(loads, terrain=None, cell_size=0.01):
 
 
 def test_a_sound_bake_has_nothing_to_say():
-    assert not found(stands())
+    assert not findings_of(stands())
 
 
 @pytest.mark.parametrize("over", [0.06, -0.06, 0.015])
 def test_a_ground_off_the_resting_skin_is_told_by_how_much(over):
-    findings = found(stands(skin=np.add(PLACES, (0, 0, over))))
+    findings = findings_of(stands(skin=np.add(PLACES, (0, 0, over))))
     if abs(over) < 0.012 * STATURE:
         assert not findings
         return
@@ -79,39 +79,39 @@ def test_feet_that_stand_level_on_a_slope_want_stairs_and_not_a_ground_of_anothe
     loads = replace(loads, motion=replace(loads.motion, soles=soles))
     normal = np.broadcast_to((-np.sin(slope), 0.0, np.cos(slope)), loads.contacts.normal.shape)
     loads = replace(loads, contacts=replace(loads.contacts, normal=normal))
-    told = found(loads, Slope(slope=0.4))
-    assert told.keys() == {code}
-    assert ("slopes by 22°" in told[code].message) == ("Use Selected" in told[code].remedy) == (not turned)
+    findings = findings_of(loads, Slope(slope=0.4))
+    assert findings.keys() == {code}
+    assert ("slopes by 22°" in findings[code].message) == ("Use Selected" in findings[code].remedy) == (not turned)
     skeleton = replace(loads, motion=replace(loads.motion, skin=None, stature=STATURE))
-    assert found(skeleton, Slope(slope=0.4)).keys() == ({"level_on_slope"} if not turned else set())
+    assert findings_of(skeleton, Slope(slope=0.4)).keys() == ({"level_on_slope"} if not turned else set())
 
 
 def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_apart():
     away = np.add(PLACES, (1.0, 0, 0))
-    assert found(stands(skin=np.concatenate([PLACES[:1], away]))).keys() == {"step_without_skin"}
-    assert found(stands(skin=away)).keys() == {"step_without_skin", "skin_without_step"}
+    assert findings_of(stands(skin=np.concatenate([PLACES[:1], away]))).keys() == {"step_without_skin"}
+    assert findings_of(stands(skin=away)).keys() == {"step_without_skin", "skin_without_step"}
     loads = stands()
     frames = loads.motion.skin.frames
     alone = skin_at(frames, np.concatenate([PLACES, away[:1]]))
     alone.rise[len(frames) // 2 :, :2] = 1.0  # from there on it stands on the other, which does not print
     other = replace(loads, motion=replace(loads.motion, skin=alone))
-    assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
+    assert findings_of(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.12, False), (0.18, True)])
-def test_skin_that_rests_without_a_step_for_more_than_15_percent_of_the_time_is_told(share, told):
+@pytest.mark.parametrize(("share", "is_named"), [(0.12, False), (0.18, True)])
+def test_skin_that_rests_without_a_step_for_more_than_15_percent_of_the_time_is_told(share, is_named):
     loads = stands()
     frames = loads.motion.skin.frames
     skin = skin_at(frames, np.concatenate([PLACES, np.add(PLACES[:1], (1.0, 0, 0))]))
     skin.rise[round(len(frames) * (1 - share)) :, :2] = 1.0
-    findings = found(replace(loads, motion=replace(loads.motion, skin=skin)))
-    assert ("skin_without_step" in findings) == told
+    findings = findings_of(replace(loads, motion=replace(loads.motion, skin=skin)))
+    assert ("skin_without_step" in findings) == is_named
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_feet_that_rest_apart_on_both_sides_of_the_ground_each_have_skin(side):
     heights = np.array([(0, 0, -0.011), (0, 0, 0.008)]) * side * STATURE  # within 1.2 %, but apart by more than 1.5 %
-    assert not found(stands(skin=PLACES + heights))
+    assert not findings_of(stands(skin=PLACES + heights))
 
 
 @pytest.mark.parametrize(("depth", "agrees"), [(0.05, True), (0.3, False)])
@@ -120,33 +120,33 @@ def test_a_step_whose_skin_has_sunk_into_the_ground_is_that_skins(depth, agrees)
     sunk = skin_at(loads.motion.skin.frames, PLACES)
     middle = len(sunk.frames) // 2
     sunk.position[middle - 3 : middle + 4, 0, 2] -= depth
-    findings = found(replace(loads, motion=replace(loads.motion, skin=sunk)))
+    findings = findings_of(replace(loads, motion=replace(loads.motion, skin=sunk)))
     assert ("step_without_skin" not in findings) == agrees
 
 
 def test_a_foot_that_bears_on_the_edge_of_its_sole_leaves_no_print_and_says_so():
     loads = stands()
     loads.motion.soles[0].transforms[:] = pose(PLACES[0], 0.0, np.pi / 2)
-    told = found(loads)["sole_without_print"]
-    assert told.message == "'left' of 'walker' bears load and leaves no print"
+    finding = findings_of(loads)["sole_without_print"]
+    assert finding.message == "'left' of 'walker' bears load and leaves no print"
 
 
 def test_skin_off_the_ground_and_bodies_without_skin_say_nothing():
     loads = stands()
-    assert not found(replace(loads, motion=replace(loads.motion, skin=None)))
+    assert not findings_of(replace(loads, motion=replace(loads.motion, skin=None)))
     skin = loads.motion.skin
     beside = LowSkin(skin.frames, np.add(skin.position, (9.0, 0, 0)), skin.rise, skin.calm, skin.height)
-    codes = found(replace(loads, motion=replace(loads.motion, skin=beside)), Slope(edge=5.0)).keys()
+    codes = findings_of(replace(loads, motion=replace(loads.motion, skin=beside)), Slope(edge=5.0)).keys()
     assert "ground_off_skin" not in codes
 
 
-@pytest.mark.parametrize(("apart", "told"), [(0.015, False), (0.03, True)])
-def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, told):
+@pytest.mark.parametrize(("apart", "is_named"), [(0.015, False), (0.03, True)])
+def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, is_named):
     loads = stands()
     loads = replace(loads, contacts=replace(loads.contacts, offset=np.array([0.0, apart])))
-    findings = found(loads)
-    assert ("feet_apart" in findings) == told
-    if told:
+    findings = findings_of(loads)
+    assert ("feet_apart" in findings) == is_named
+    if is_named:
         assert f"'right' of 'walker' is planted {apart * 100:.1f} cm higher" in findings["feet_apart"].message
 
 
@@ -164,7 +164,7 @@ def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, t
 )
 def test_a_body_of_another_unit_is_told_its_scale(size, remedy, unit):
     loads = stands()
-    findings = found(replace(loads, motion=replace(loads.motion, stature=size)))
+    findings = findings_of(replace(loads, motion=replace(loads.motion, stature=size)))
     assert ("unit_scale" in findings) == bool(remedy)
     if remedy:
         assert remedy in findings["unit_scale"].remedy
@@ -183,13 +183,13 @@ def test_a_skeleton_of_a_person_that_is_no_size_of_people_is_told_its_factor(siz
     bare = tuple(replace(sole, sole=replace(sole.sole, underside=None)) for sole in loads.motion.soles)
     joints = {name: np.repeat(path, len(loads.motion.frames), axis=0) for name, path in LEGS.items()}
     motion = replace(loads.motion, stature=size, soles=bare, joints={**loads.motion.joints, **joints})
-    findings = found(replace(loads, motion=motion))
+    findings = findings_of(replace(loads, motion=motion))
     assert ("unit_scale" in findings) == bool(remedy)
     if remedy:
         assert remedy in findings["unit_scale"].remedy
         assert findings["unit_scale"].severity == ("warning" if size > 0.05 else "error")
     has_skin = tuple(replace(sole, sole=replace(sole.sole, underside=np.zeros((1, 3)))) for sole in bare)
-    assert "unit_scale" not in {*found(replace(loads, motion=replace(motion, soles=has_skin)))} or size == 0.017
+    assert "unit_scale" not in {*findings_of(replace(loads, motion=replace(motion, soles=has_skin)))} or size == 0.017
 
 
 @pytest.mark.parametrize("legs", [True, False])
@@ -198,7 +198,7 @@ def test_a_figure_on_two_legs_with_the_volume_of_a_horse_is_told_what_people_of_
     joints = {name: np.repeat(path, len(loads.motion.frames), axis=0) for name, path in LEGS.items()} if legs else {}
     heavy = replace(loads.motion.skin, mass=950.0)
     motion = replace(loads.motion, skin=heavy, size=1.77, joints={**loads.motion.joints, **joints})
-    findings = found(replace(loads, motion=replace(motion, mass=950.0)))
+    findings = findings_of(replace(loads, motion=replace(motion, mass=950.0)))
     assert ("mass_of_size" in findings) == legs
     if legs:
         assert "a height of 1.77 m on two legs suggests about 76 kg" in findings["mass_of_size"].message
@@ -209,16 +209,16 @@ def test_a_sole_on_the_edge_of_the_ground_says_how_much_of_it_prints(share):
     length = 0.27
     edge = Slope(edge=(share - 0.5) * length)
     loads = stands(skin=np.subtract(PLACES, (0.05, 0, 0)))
-    findings = found(loads, edge)
+    findings = findings_of(loads, edge)
     assert ("edge_of_ground" in findings) == (share < 0.9)
     if share < 0.9:
-        told = float(findings["edge_of_ground"].message.split("as little as ")[1].split(" %")[0])
-        assert told / 100 == pytest.approx(share, abs=0.03)
+        percent = float(findings["edge_of_ground"].message.split("as little as ")[1].split(" %")[0])
+        assert percent / 100 == pytest.approx(share, abs=0.03)
         assert "2 steps of 'walker'" in findings["edge_of_ground"].message
 
 
 @pytest.mark.parametrize(
-    ("slower", "speed", "period", "told"),
+    ("slower", "speed", "period", "is_named"),
     [
         (1.0, 1.3, 1.1, False),
         (1.2, 1.3, 1.1, False),  # data of 30 frames a second in a scene of 25
@@ -230,12 +230,14 @@ def test_a_sole_on_the_edge_of_the_ground_says_how_much_of_it_prints(share):
         (1.0, 0.7, 1.7, False),
     ],
 )
-def test_data_of_more_frames_a_second_than_the_scene_is_slow_motion_and_a_slow_walk_is_not(slower, speed, period, told):
+def test_data_of_more_frames_a_second_than_the_scene_is_slow_motion_and_a_slow_walk_is_not(
+    slower, speed, period, is_named
+):
     loads = walk(speed=speed, period=period)
     slow = replace(loads, motion=replace(loads.motion, frame_rate=loads.motion.frame_rate / slower))
     _, footprints = pressed(loads, SNOW, 0.02)
     codes = {finding.code for finding in self_check([slow], footprints, FlatTerrain(), 0.02, "Field")}
-    assert ("slow_motion" in codes) == told
+    assert ("slow_motion" in codes) == is_named
 
 
 def test_the_walk_ratio_is_that_of_an_adult():
@@ -259,7 +261,7 @@ def test_steps_that_end_at_the_bottom_of_the_layer_are_said(preset, said):
     heavy.forces.forces[:] *= 1.5  # a person with a load
     footprints = [footprint for result in simulate([heavy], soft, 0.02) for footprint in result.footprints]
     findings = bottomed_out(footprints, ground.material, "Field")
-    assert [one.code for one in findings] == ["bottomed_out"] * said
+    assert [finding.code for finding in findings] == ["bottomed_out"] * said
     if said:
         assert re.match(
             r"\d of 6 steps press 'Field' as far as it goes, 60 cm: make the layer deeper", findings[0].text

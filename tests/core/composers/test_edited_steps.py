@@ -55,11 +55,11 @@ def ground_of(material="soil", terrain=None):
     return SoftGround(terrain or FlatTerrain(), MATERIALS[material])
 
 
-def edited(left, edits, material="soil"):
+def edited(bake, edits, material="soil"):
     """The record with edits of steps by their number."""
-    count = len(left.footprints)
-    named = {step_id(left.footprints[n % count], n // count): edit for n, edit in edits.items()}
-    return with_edits(left, named, ground_of(material), CELL)
+    count = len(bake.footprints)
+    named = {step_id(bake.footprints[n % count], n // count): edit for n, edit in edits.items()}
+    return with_edits(bake, named, ground_of(material), CELL)
 
 
 def elsewhere(loads, footprint, edit):
@@ -68,18 +68,18 @@ def elsewhere(loads, footprint, edit):
     first = footprint.pressed_by.first - footprint.pressed_by.approach
     during = slice(first, footprint.pressed_by.first + len(footprint.load_frames))
     turned = np.radians(edit.turn_deg)
-    there = pose((*(footprint.position[:2] + edit.move_m), 0.0), turned) @ pose((*(-footprint.position[:2]), 0.0))
+    carry = pose((*(footprint.position[:2] + edit.move_m), 0.0), turned) @ pose((*(-footprint.position[:2]), 0.0))
     transforms = loads.motion.soles[index].transforms.copy()
-    transforms[during] = there @ transforms[during]
+    transforms[during] = carry @ transforms[during]
     soles = list(loads.motion.soles)
     soles[index] = replace(soles[index], transforms=transforms)
     return replace(loads, motion=replace(loads.motion, soles=tuple(soles)))
 
 
-def difference(one, other):
+def difference(first, other):
     """Largest difference of two grounds [m]."""
-    windows = {*one.tile_windows(), *other.tile_windows()}
-    return max(float(np.abs(one.read(window) - other.read(window)).max()) for window in windows)
+    windows = {*first.tile_windows(), *other.tile_windows()}
+    return max(float(np.abs(first.read(window) - other.read(window)).max()) for window in windows)
 
 
 @pytest.mark.parametrize("material", MATERIALS)
@@ -87,22 +87,22 @@ def difference(one, other):
     "edit", [StepEdit(move_m=(0.0537, 0.0313), turn_deg=3.0), StepEdit(move_m=(-0.6, 0.02), turn_deg=20.0)]
 )
 def test_a_moved_step_is_pressed_as_a_simulation_of_the_moved_motion_presses_it(material, edit):
-    loads, left = baked(material)
-    step = left.footprints[3]
+    loads, bake = baked(material)
+    step = bake.footprints[3]
     whole, _ = pressed(elsewhere(loads, step, edit), MATERIALS[material], CELL)
-    ours = recompose(edited(left, {3: edit}, material).edited, cell_size=CELL)
+    ours = recompose(edited(bake, {3: edit}, material).edited, cell_size=CELL)
     # What slides comes to rest a little otherwise where the feet in contact are not pressed in turn within a frame.
     assert difference(whole, ours) < (2e-3 if material == "sand" else 6e-5)
-    assert difference(whole, recompose(left.footprints)) > 5e-3
+    assert difference(whole, recompose(bake.footprints)) > 5e-3
 
 
 def test_a_step_on_top_of_another_presses_what_that_one_left():
-    _, left = baked()
-    one, other = left.footprints[2], left.footprints[4]  # of the same foot
-    onto = StepEdit(move_m=tuple(one.position[:2] - other.position[:2]))
-    after = edited(left, {4: onto})
+    _, bake = baked()
+    first, other = bake.footprints[2], bake.footprints[4]  # of the same foot
+    onto = StepEdit(move_m=tuple(first.position[:2] - other.position[:2]))
+    after = edited(bake, {4: onto})
     assert after.pressed_again[4].compressed_m3 < 0.3 * other.compressed_m3
-    back = edited(left, {2: StepEdit(move_m=tuple(other.position[:2] - one.position[:2]))})
+    back = edited(bake, {2: StepEdit(move_m=tuple(other.position[:2] - first.position[:2]))})
     assert sorted(back.pressed_again) == [2, 4]  # what comes later is pressed again too
     assert back.pressed_again[4].compressed_m3 < 0.3 * other.compressed_m3
     muted = edited(after, {4: onto, 2: StepEdit(mute=True)})
@@ -112,8 +112,8 @@ def test_a_step_on_top_of_another_presses_what_that_one_left():
 
 @pytest.mark.parametrize("strength", [0.0, 0.5, 1.5])
 def test_strength_is_a_factor_on_the_depth_and_the_volumes(strength):
-    _, left = baked()
-    before, after = left.footprints[1], edited(left, {1: StepEdit(strength=strength)}).pressed_again[1]
+    _, bake = baked()
+    before, after = bake.footprints[1], edited(bake, {1: StepEdit(strength=strength)}).pressed_again[1]
     assert after.max_depth_m == pytest.approx(strength * before.max_depth_m, abs=5e-6)
     assert after.compressed_m3 == pytest.approx(strength * before.compressed_m3, rel=1e-3, abs=1e-12)
     assert after.rim_m3 == pytest.approx(2 * SOIL.poisson_ratio * after.compressed_m3, rel=1e-6, abs=1e-12)
@@ -121,38 +121,38 @@ def test_strength_is_a_factor_on_the_depth_and_the_volumes(strength):
 
 @pytest.mark.parametrize("material", ["soil", "hardening"])
 def test_a_copy_prints_as_the_moved_step_itself_and_leaves_that_one_alone(material):
-    _, left = baked(material)
+    _, bake = baked(material)
     away = StepEdit(move_m=(0.0, 1.5), turn_deg=30.0)
-    moved, copied = edited(left, {1: away}, material), edited(left, {1 + len(left.footprints): away}, material)
+    moved, copied = edited(bake, {1: away}, material), edited(bake, {1 + len(bake.footprints): away}, material)
     print_of = next(step.footprint for step in copied.steps if step.is_copy)
     assert record.dump(BakeRecord((print_of,), {})) == record.dump(BakeRecord((moved.pressed_again[1],), {}))
-    assert len(copied.edited) == len(left.footprints) + 1
-    assert copied.steps[1].footprint is left.footprints[1]
+    assert len(copied.edited) == len(bake.footprints) + 1
+    assert copied.steps[1].footprint is bake.footprints[1]
 
 
 def test_a_copy_in_the_place_of_its_step_presses_little_further():
-    _, left = baked()
-    copied = edited(left, {1 + len(left.footprints): StepEdit(shift_frames=60)})
+    _, bake = baked()
+    copied = edited(bake, {1 + len(bake.footprints): StepEdit(shift_frames=60)})
     again = next(step.footprint for step in copied.steps if step.is_copy)
-    assert again.compressed_m3 < 0.05 * left.footprints[1].compressed_m3
+    assert again.compressed_m3 < 0.05 * bake.footprints[1].compressed_m3
 
 
 def test_a_later_step_leaves_the_same_print_later():
-    _, left = baked()
-    before, after = left.footprints[2], edited(left, {2: StepEdit(shift_frames=7)}).pressed_again[2]
+    _, bake = baked()
+    before, after = bake.footprints[2], edited(bake, {2: StepEdit(shift_frames=7)}).pressed_again[2]
     np.testing.assert_array_equal(after.load_frames, before.load_frames + 7)
     for frame in (*range(int(before.start_frame) + 3, int(before.end_frame), 3), np.inf):
         assert difference(recompose([before], frame), recompose([after], frame + 7)) < 1e-5
 
 
 def test_a_step_that_comes_earlier_than_another_is_pressed_by_it():
-    _, left = baked()
-    one, other = left.footprints[2], left.footprints[4]  # of the same foot
-    onto = StepEdit(move_m=tuple(one.position[:2] - other.position[:2]))
-    first = replace(onto, shift_frames=int(one.start_frame - other.end_frame) - 2)
-    after = edited(left, {4: first})
+    _, bake = baked()
+    earlier, other = bake.footprints[2], bake.footprints[4]  # of the same foot
+    onto = StepEdit(move_m=tuple(earlier.position[:2] - other.position[:2]))
+    first = replace(onto, shift_frames=int(earlier.start_frame - other.end_frame) - 2)
+    after = edited(bake, {4: first})
     assert sorted(after.pressed_again) == [2, 4]
-    assert after.pressed_again[2].compressed_m3 < 0.3 * one.compressed_m3
+    assert after.pressed_again[2].compressed_m3 < 0.3 * earlier.compressed_m3
     assert after.pressed_again[4].compressed_m3 == pytest.approx(other.compressed_m3, rel=0.02)
     frames = [footprint.start_frame for footprint in after.edited]
     assert frames == sorted(frames)
@@ -161,8 +161,8 @@ def test_a_step_that_comes_earlier_than_another_is_pressed_by_it():
 @pytest.mark.parametrize("scale", [0.7, 1.6])
 def test_a_larger_step_covers_more_at_the_same_pressure(scale):
     loads = standing(box_sole(0.3, 0.1), (0.5, 0.2, 0.0), 600.0)
-    left = BakeRecord(tuple(pressed(loads, SOIL, CELL)[1]), {})
-    before, after = left.footprints[0], edited(left, {0: StepEdit(scale=scale)}).pressed_again[0]
+    bake = BakeRecord(tuple(pressed(loads, SOIL, CELL)[1]), {})
+    before, after = bake.footprints[0], edited(bake, {0: StepEdit(scale=scale)}).pressed_again[0]
     assert after.area_m2 == pytest.approx(scale**2 * before.area_m2, rel=0.03)
     assert after.peak_force_n / after.area_m2 == pytest.approx(before.peak_force_n / before.area_m2, rel=0.03)
     assert after.max_depth_m == pytest.approx(before.max_depth_m, rel=0.03)
@@ -173,13 +173,13 @@ def test_a_step_in_another_sole_is_pressed_as_a_simulation_of_that_sole():
     place, heading, plate = np.array([0.5, 0.2, 0.0]), 0.4, box_sole(0.4, 0.15)
     foot = standing(foot_sole("foot.L", "L"), place, 600.0, heading=heading)
     other = standing(plate, (3.0, 0.0, 0.0), 600.0, name="giant")
-    left = BakeRecord(tuple(pressed([foot, other], SOIL, CELL)[1]), {})
-    middles = [(one.outline.min(axis=0) + one.outline.max(axis=0)) / 2 for one in (foot.motion.soles[0].sole, plate)]
-    there = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
-    _, (expected,) = pressed(standing(plate, there, 600.0, heading=heading), SOIL, CELL)
-    after = edited(left, {0: StepEdit(sole=f"giant/{plate.name}")}).pressed_again[0]
+    bake = BakeRecord(tuple(pressed([foot, other], SOIL, CELL)[1]), {})
+    middles = [(each.outline.min(axis=0) + each.outline.max(axis=0)) / 2 for each in (foot.motion.soles[0].sole, plate)]
+    target = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
+    _, (expected,) = pressed(standing(plate, target, 600.0, heading=heading), SOIL, CELL)
+    after = edited(bake, {0: StepEdit(sole=f"giant/{plate.name}")}).pressed_again[0]
     assert difference(recompose([expected]), recompose([after])) < 1e-6
-    assert after.area_m2 > 1.5 * left.footprints[0].area_m2
+    assert after.area_m2 > 1.5 * bake.footprints[0].area_m2
 
 
 def mesh_sole(name="Shoe", length=0.4, width=0.15):
@@ -194,25 +194,25 @@ def mesh_sole(name="Shoe", length=0.4, width=0.15):
 def test_a_step_in_the_sole_of_a_mesh_is_pressed_as_a_simulation_of_that_sole():
     place, heading, mesh = np.array([0.5, 0.2, 0.0]), 0.4, mesh_sole()
     foot = standing(foot_sole("foot.L", "L"), place, 600.0, heading=heading)
-    left = BakeRecord(tuple(pressed(foot, SOIL, CELL)[1]), {})
+    bake = BakeRecord(tuple(pressed(foot, SOIL, CELL)[1]), {})
     outlines = foot.motion.soles[0].sole.outline, mesh.pressing.sole.outline
-    middles = [(one.min(axis=0) + one.max(axis=0)) / 2 for one in outlines]
-    there = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
-    _, (expected,) = pressed(standing(mesh.pressing.sole, there, 600.0, heading=heading), SOIL, CELL)
-    after = edited(left, {0: StepEdit(sole="Shoe", mesh=mesh)}).pressed_again[0]
+    middles = [(outline.min(axis=0) + outline.max(axis=0)) / 2 for outline in outlines]
+    target = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
+    _, (expected,) = pressed(standing(mesh.pressing.sole, target, 600.0, heading=heading), SOIL, CELL)
+    after = edited(bake, {0: StepEdit(sole="Shoe", mesh=mesh)}).pressed_again[0]
     assert difference(recompose([expected]), recompose([after])) < 1e-6
     assert after.area_m2 == pytest.approx(0.4 * 0.15, rel=0.05)
 
 
 def test_the_sole_of_a_mesh_is_kept_with_the_edits():
-    _, left = baked()
+    _, bake = baked()
     mesh = mesh_sole()
-    after = edited(left, {1: StepEdit(sole="Shoe", mesh=mesh), 2: StepEdit(sole="Shoe", mesh=mesh, mute=True)})
-    assert without_sole(left.footprints, after.edits) == []
+    after = edited(bake, {1: StepEdit(sole="Shoe", mesh=mesh), 2: StepEdit(sole="Shoe", mesh=mesh, mute=True)})
+    assert without_sole(bake.footprints, after.edits) == []
     assert from_json(json.loads(json.dumps(to_json(after.edits))), "It") == after.edits
     stored = record.load(record.dump(after))
     assert stored.edits == after.edits
-    again = with_edits(BakeRecord(left.footprints, {}), stored.edits, ground_of(), CELL)
+    again = with_edits(BakeRecord(bake.footprints, {}), stored.edits, ground_of(), CELL)
     assert record.dump(again) == record.dump(after)
 
 
@@ -240,21 +240,21 @@ def test_a_kept_sole_that_is_none_is_named(change, said):
 
 def test_a_foot_of_the_same_shape_leaves_the_same_print():
     twin = walk(steps=3, origin=(0.0, 2.0, 0.0), heading=0.7, name="twin")
-    one = walk(steps=3, origin=(0.0037, 0.0021, 0.0))  # nothing lies on the border of a cell
-    left = BakeRecord(tuple(pressed([one, twin], SOIL, CELL)[1]), {})
-    number = next(n for n, step in enumerate(left.footprints) if (step.character, step.sole) == ("walker", "foot.R"))
-    after = edited(left, {number: StepEdit(sole="twin/foot.R")}).pressed_again[number]
-    assert difference(recompose([after]), recompose([left.footprints[number]])) < 1e-5
+    first = walk(steps=3, origin=(0.0037, 0.0021, 0.0))  # nothing lies on the border of a cell
+    bake = BakeRecord(tuple(pressed([first, twin], SOIL, CELL)[1]), {})
+    number = next(n for n, step in enumerate(bake.footprints) if (step.character, step.sole) == ("walker", "foot.R"))
+    after = edited(bake, {number: StepEdit(sole="twin/foot.R")}).pressed_again[number]
+    assert difference(recompose([after]), recompose([bake.footprints[number]])) < 1e-5
 
 
 @pytest.mark.parametrize(("whole", "size"), [(True, 1.2), (False, 0.8)])
 def test_a_sole_in_one_piece_and_one_in_two_take_each_others_steps(whole, size):
     plate = box_sole(size * FOOT_LENGTH, 0.08)
-    one, other = walk(steps=2), standing(plate, (0.0, 3.0, 0.0), 600.0, name="plate")
-    left = BakeRecord(tuple(pressed([one, other], SOIL, CELL)[1]), {})
-    number = next(n for n, step in enumerate(left.footprints) if (step.character == "walker") == whole)
-    before = left.footprints[number]
-    after = edited(left, {number: StepEdit(sole=f"plate/{plate.name}" if whole else "walker/foot.L")}).pressed_again[
+    walker, other = walk(steps=2), standing(plate, (0.0, 3.0, 0.0), 600.0, name="plate")
+    bake = BakeRecord(tuple(pressed([walker, other], SOIL, CELL)[1]), {})
+    number = next(n for n, step in enumerate(bake.footprints) if (step.character == "walker") == whole)
+    before = bake.footprints[number]
+    after = edited(bake, {number: StepEdit(sole=f"plate/{plate.name}" if whole else "walker/foot.L")}).pressed_again[
         number
     ]
     np.testing.assert_allclose(after.position[:2], before.position[:2], atol=0.03)
@@ -263,19 +263,19 @@ def test_a_sole_in_one_piece_and_one_in_two_take_each_others_steps(whole, size):
 
 
 def test_a_sole_that_is_not_in_the_bake_is_named_and_the_own_one_presses():
-    _, left = baked()
-    plain, away = (edited(left, {1: StepEdit(turn_deg=20.0, sole=sole)}) for sole in ("", "fox/paw.L"))
+    _, bake = baked()
+    plain, away = (edited(bake, {1: StepEdit(turn_deg=20.0, sole=sole)}) for sole in ("", "fox/paw.L"))
     assert difference(recompose(away.edited), recompose(plain.edited)) == 0.0
-    assert without_sole(left.footprints, away.edits) == list(away.edits)
-    assert without_sole(left.footprints, plain.edits) == []
+    assert without_sole(bake.footprints, away.edits) == list(away.edits)
+    assert without_sole(bake.footprints, plain.edits) == []
 
 
 def test_a_moved_step_follows_the_ground():
     terrain = Hill()
     loads = walk(steps=2)
-    left = BakeRecord(tuple(pressed(loads, SOIL, CELL, terrain)[1]), {})
-    step = left.footprints[0]
-    up = with_edits(left, {step_id(step): StepEdit(move_m=(2.0, 0.0))}, SoftGround(terrain, SOIL), CELL)
+    bake = BakeRecord(tuple(pressed(loads, SOIL, CELL, terrain)[1]), {})
+    step = bake.footprints[0]
+    up = with_edits(bake, {step_id(step): StepEdit(move_m=(2.0, 0.0))}, SoftGround(terrain, SOIL), CELL)
     moved = up.pressed_again[0]
     assert moved.position[0] == pytest.approx(step.position[0] + 2.0, abs=0.02)
     assert moved.position[2] == pytest.approx(terrain.heights(moved.position[0], 0.0), abs=2e-3)
@@ -287,11 +287,11 @@ def test_a_step_off_the_ground_leaves_nothing():
         def heights(self, x, y):
             return np.where(np.asarray(x) < 3.0, 0.0, np.nan) + 0 * np.asarray(y)
 
-    _, left = baked()
-    name = step_id(left.footprints[0])
-    gone = with_edits(left, {name: StepEdit(move_m=(50.0, 0.0))}, SoftGround(Plate(), SOIL), CELL)
+    _, bake = baked()
+    name = step_id(bake.footprints[0])
+    gone = with_edits(bake, {name: StepEdit(move_m=(50.0, 0.0))}, SoftGround(Plate(), SOIL), CELL)
     assert gone.pressed_again[0] is None
-    assert len(gone.edited) == len(left.footprints) - 1
+    assert len(gone.edited) == len(bake.footprints) - 1
     assert record.dump(record.load(record.dump(gone))) == record.dump(gone)
 
 
@@ -318,12 +318,12 @@ CHANGES = st.builds(
     material=st.sampled_from(["soil", "hardening"]),
 )
 def test_edits_one_by_one_give_the_bytes_of_all_at_once_and_reset_those_of_the_bake(edits, order, material):
-    _, left = baked(material)
-    first = record.dump(left)
-    at_once = edited(left, edits, material)
+    _, bake = baked(material)
+    first = record.dump(bake)
+    at_once = edited(bake, edits, material)
     stored = record.load(record.dump(at_once))  # as it is met again in the file
     assert record.dump(edited(record.load(first), edits, material)) == record.dump(at_once) == record.dump(stored)
-    steps, so_far = EditedSteps(left.footprints, ground_of(material), CELL), {}
+    steps, so_far = EditedSteps(bake.footprints, ground_of(material), CELL), {}
     names = list(edits)
     order.shuffle(names)
     for number in names:
@@ -336,8 +336,8 @@ def test_edits_one_by_one_give_the_bytes_of_all_at_once_and_reset_those_of_the_b
 
 
 def test_a_print_of_which_too_little_is_kept_can_only_be_muted():
-    _, left = baked()
-    old = replace(left, footprints=[replace(footprint, pressed_by=None) for footprint in left.footprints])
+    _, bake = baked()
+    old = replace(bake, footprints=[replace(footprint, pressed_by=None) for footprint in bake.footprints])
     assert edited(old, {1: StepEdit(mute=True)}).pressed_again == {1: None}
     with pytest.raises(InputError, match=r"foot.R, at frame 21 .*can only be muted: give it fewer"):
         edited(old, {1: StepEdit(strength=0.5)})
@@ -346,26 +346,26 @@ def test_a_print_of_which_too_little_is_kept_can_only_be_muted():
 @pytest.mark.parametrize("row", [3, -3])
 def test_a_forged_print_whose_sole_is_thrown_far_away_is_refused_in_no_time(row):
     """Steps are kept as second differences: a single forged number moves all that come later, some metres in each."""
-    _, left = baked()
-    kept = left.footprints[1].pressed_by
-    coded = kept.coded.reshape(-1, kept.width).copy()
+    _, bake = baked()
+    steps = bake.footprints[1].pressed_by
+    coded = steps.coded.reshape(-1, steps.width).copy()
     coded[row, :2] += round(30.0 / LENGTH / (len(coded) - row % len(coded)))
-    forged = replace(left.footprints[1], pressed_by=replace(kept, coded=coded.reshape(-1)))
+    forged = replace(bake.footprints[1], pressed_by=replace(steps, coded=coded.reshape(-1)))
     started = time.process_time()
     with pytest.raises(InputError, match=r"foot.R, at frame 21 is larger than it can be: clear"):
-        edited(replace(left, footprints=[left.footprints[0], forged]), {1: StepEdit(move_m=(0.1, 0.0))})
+        edited(replace(bake, footprints=[bake.footprints[0], forged]), {1: StepEdit(move_m=(0.1, 0.0))})
     assert time.process_time() - started < 2.0  # 20 s is a hang
 
 
 @pytest.mark.alone
 @pytest.mark.slow
 def test_one_step_of_a_thousand_is_edited_in_50_ms():
-    _, left = baked(steps=1000)
-    steps = EditedSteps(left.footprints, ground_of(), CELL)
+    _, bake = baked(steps=1000)
+    steps = EditedSteps(bake.footprints, ground_of(), CELL)
     took = []
     for number in range(480, 500):
         start = time.thread_time()  # whatever else the machine does
         steps.pressed_again({number: StepEdit(move_m=(0.1, 0.0), turn_deg=5.0)})
         took.append(time.thread_time() - start)
-    print(f"one step of {len(left.footprints)}: {1e3 * np.median(took):.1f} ms, at most {1e3 * max(took):.1f} ms")
+    print(f"one step of {len(bake.footprints)}: {1e3 * np.median(took):.1f} ms, at most {1e3 * max(took):.1f} ms")
     assert np.median(took) < at_pace(0.05)

@@ -63,8 +63,10 @@ def between(**rates):
 def prints(weather, second=1.0, material=MATERIAL, loads=None):
     weathering = weathering_of(weather, LAYER)
     ground = SoftGround(FlatTerrain(), material, weathering=weathering)
-    found = [one for result in simulate([loads or two_steps(second)], ground, CELL) for one in result.footprints]
-    return sorted(found, key=lambda one: one.start_frame)
+    footprints = [
+        footprint for result in simulate([loads or two_steps(second)], ground, CELL) for footprint in result.footprints
+    ]
+    return sorted(footprints, key=lambda footprint: footprint.start_frame)
 
 
 def cells(footprints):
@@ -91,10 +93,10 @@ def test_weather_that_is_none_changes_no_bit(surface, options):
     material, loads = replace(MATERIAL, **options), walk(steps=5, speed=0.2)
     calm = FeltWeather(temperature=-10.0, wind=2.0, time_scale=3600.0, surface=surface)
     plain, felt = (prints(weather, material=material, loads=loads) for weather in (None, calm))
-    for one, other in zip(plain, felt, strict=True):
-        assert one.compressed_m3 == other.compressed_m3
+    for footprint, other in zip(plain, felt, strict=True):
+        assert footprint.compressed_m3 == other.compressed_m3
         for changes in ("compression", "rim"):
-            before, after = getattr(one, changes), getattr(other, changes)
+            before, after = getattr(footprint, changes), getattr(other, changes)
             assert np.array_equal(before.cells[:], after.cells[:])
             assert np.array_equal(before.amounts[:], after.amounts[:])
             assert np.array_equal(before.frames, after.frames)
@@ -141,7 +143,7 @@ def test_a_print_that_rain_rounded_is_pressed_as_the_blur_left_it():
     weather = replace(between(rain=rain), surface="soil")
     first, second = prints(weather, second=0.8)
     made = cells([first])
-    rounded = np.array([gaussian_filter(one, 0.03 / CELL, mode="constant", truncate=4.0) for one in made])
+    rounded = np.array([gaussian_filter(each, 0.03 / CELL, mode="constant", truncate=4.0) for each in made])
     assert np.abs(rounded - made).max() > 5e-3
     contact = np.zeros((80, 80), bool)
     contact[25:55, 25:55] = True
@@ -160,9 +162,9 @@ def test_sand_blown_into_a_print_is_pressed_down_again(part):
     first, second = prints(weather, second=part)
     section = first.compressed_m3 / np.sqrt(first.area_m2)
     flux = w.blown_flux(8.0, SURFACES["sand"].drifts_from)
-    kept = float(np.exp(-w.fill_rate(flux, section, SURFACES["sand"].density) * 600.0 * SECONDS))
-    assert 0.5 < kept < 0.9
-    assert middle([first, second]) == pytest.approx(DEPTH * max(kept, part), rel=2e-3)
+    remaining = float(np.exp(-w.fill_rate(flux, section, SURFACES["sand"].density) * 600.0 * SECONDS))
+    assert 0.5 < remaining < 0.9
+    assert middle([first, second]) == pytest.approx(DEPTH * max(remaining, part), rel=2e-3)
 
 
 def test_a_step_into_a_print_that_stands_up_in_a_thaw():
@@ -171,8 +173,8 @@ def test_a_step_into_a_print_that_stands_up_in_a_thaw():
     thawed = float(course(weather, "snow", SECOND[0]).thawed[0])
     assert 0.03 < thawed < LAYER / 2
     ratio = 1.0 - DEPTH / LAYER
-    left = DEPTH - thawed * (1.0 - ratio**2)
-    below = max(left, DEPTH * (1.0 - thawed / LAYER))
+    remaining = DEPTH - thawed * (1.0 - ratio**2)
+    below = max(remaining, DEPTH * (1.0 - thawed / LAYER))
     assert middle([first, second]) == pytest.approx(below + thawed, abs=2e-5)
 
 
@@ -190,11 +192,11 @@ def test_wind_takes_of_a_print_what_it_fills_and_no_more():
     trodden = SparseGrid(CELL, channels=1)
     trodden.write(WHERE, made[:1] > 0)
     known = {"trodden": trodden, "pressed": made[0], "frame": 145.0, "section": 0.05}
-    left = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
-    kept = np.exp(
+    aged = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
+    share = np.exp(
         -w.fill_rate(w.blown_flux(8.0, SURFACES["sand"].drifts_from), 0.05, SURFACES["sand"].density) * 600.0 * SECONDS
     )
-    assert left.sum(axis=(1, 2)) == pytest.approx(kept * made.sum(axis=(1, 2)), rel=1e-4)
+    assert aged.sum(axis=(1, 2)) == pytest.approx(share * made.sum(axis=(1, 2)), rel=1e-4)
     assert np.array_equal(in_weather.aged(ground, WHERE, since=np.full((80, 80), 145.0), **known), made)
 
 
@@ -205,12 +207,17 @@ def seen(footprints, weather, frame, *, felt, blur=0.01):
     compression, rim = blurred_window(recompose(footprints), WHERE, blur)
     relief = (rim - compression).ravel()
     start, end = np.full((2, len(relief)), [[1e9], [-1e9]])
-    for one in footprints:
-        for changes in (one.compression, one.rim):
+    for footprint in footprints:
+        for changes in (footprint.compression, footprint.rim):
             for number, at in enumerate(changes.frames):
                 changed = changes.cells[changes.first[number] : changes.first[number + 1]]
-                row, column = np.divmod(changed, one.window.columns)
-                where = (row + one.window.row - WHERE.row) * WHERE.columns + column + one.window.column - WHERE.column
+                row, column = np.divmod(changed, footprint.window.columns)
+                where = (
+                    (row + footprint.window.row - WHERE.row) * WHERE.columns
+                    + column
+                    + footprint.window.column
+                    - WHERE.column
+                )
                 start[where], end[where] = np.minimum(start[where], at - 1.0), np.maximum(end[where], at)
     places = weather_places(
         footprints,
@@ -287,22 +294,22 @@ def ground_in(weather):
 def test_an_edited_step_changes_the_later_one_as_if_it_had_been_so(surface, edit, as_if):
     # But for the wind: how fast it fills prints is always what those of the bake say.
     weather = replace(between(**(ALL_AT_ONCE | {"wind": 0.0})), surface=surface)
-    left = BakeRecord(tuple(prints(weather, second=0.4)), {})
-    after = with_edits(left, {step_id(left.footprints[0]): edit}, ground_in(weather), CELL)
+    record = BakeRecord(tuple(prints(weather, second=0.4)), {})
+    after = with_edits(record, {step_id(record.footprints[0]): edit}, ground_in(weather), CELL)
     assert sorted(after.pressed_again) == [0, 1]
     whole = prints(weather, loads=two_steps(second=0.4, **as_if))
     assert np.abs(cells(after.edited) - cells(whole)).max() < 6e-5
-    assert np.abs(cells(left.footprints) - cells(whole)).max() > 1e-3
+    assert np.abs(cells(record.footprints) - cells(whole)).max() > 1e-3
 
 
 def test_edits_one_after_the_other_end_where_all_at_once_do():
     weather = replace(between(**ALL_AT_ONCE), surface="snow")
-    left = BakeRecord(tuple(prints(weather, second=0.4)), {})
-    first, second = map(step_id, left.footprints)
+    bake = BakeRecord(tuple(prints(weather, second=0.4)), {})
+    first, second = map(step_id, bake.footprints)
     wanted = {first: StepEdit(strength=0.8), second: StepEdit(turn_deg=30.0)}
-    steps = EditedSteps(left.footprints, ground_in(weather), CELL)
-    now = left
+    steps = EditedSteps(bake.footprints, ground_in(weather), CELL)
+    now = bake
     for edits in ({second: StepEdit(mute=True)}, {first: StepEdit(shift_frames=9)}, {}, wanted):
         now = steps.record_with(now, edits)
-    assert record.dump(now) == record.dump(with_edits(left, wanted, ground_in(weather), CELL))
+    assert record.dump(now) == record.dump(with_edits(bake, wanted, ground_in(weather), CELL))
     assert not steps.record_with(now, {}).pressed_again

@@ -79,7 +79,7 @@ def test_the_newest_steps_are_pressed_anew_onto_what_lies_there(loads):
     soft.go_to(playhead.frame)
     for footprint in footprints_of(soft, soft.loads_by_now()):
         x, y = footprint.position[:2]
-        depths = [one.ground.nearest(x, y)[0] for one in (newest, soft, playhead)]
+        depths = [each.ground.nearest(x, y)[0] for each in (newest, soft, playhead)]
         if footprint.start_frame > since:
             assert depths[0] == pytest.approx(depths[1], rel=1e-6)
             assert depths[0] > 1.5 * depths[2]

@@ -87,8 +87,8 @@ def test_the_typical_step_is_the_median_of_those_that_are_pressed(pressure):
     contacts = predicted(crowd, SNOW, pressure, cell=0.01)
     assert len(contacts.depths) > 2 * SAMPLE > len(contacts.sample)
     for material in (SNOW, stiffer):
-        prints = [prints_of([one], material, pressure, cell=0.01) for one in crowd]
-        expected = typical_of([print_ for one in prints for print_ in one])
+        prints = [prints_of([each], material, pressure, cell=0.01) for each in crowd]
+        expected = typical_of([print_ for each in prints for print_ in each])
         assert typical_depth(contacts, material, pressure) == pytest.approx(expected, rel=0.02)
         assert material != SNOW or contacts.typical == pytest.approx(expected, rel=0.02)
 
@@ -192,7 +192,7 @@ def test_the_typical_step_is_of_feet_whatever_else_prints():
     loads, ball = walk(steps=4), resting(prop_sole(*sphere(0.2)), (9.0, 9.0, 0.2), 5000.0)
     both = prints_of([loads, ball], SNOW, "UNIFORM", cell=0.01)
     assert typical_of(both) == typical_of(prints_of([loads], SNOW, "UNIFORM", cell=0.01))
-    assert max(one.max_depth_m for one in both) > 2 * typical_of(both)
+    assert max(each.max_depth_m for each in both) > 2 * typical_of(both)
     contacts = predicted([loads, ball], cell=0.01)
     assert contacts.typical == pytest.approx(typical_of(both), rel=0.02)
     assert contacts.depths.max() > 2 * contacts.typical

@@ -126,11 +126,11 @@ def test_depth_and_volume_do_not_depend_on_place_or_heading(cell):
 
 
 def test_a_shift_by_whole_cells_changes_nothing_but_the_place():
-    here, (one,) = pressed(walk(steps=1, origin=(0.0013, 0.0007, 0.0)), SNOW)
-    there, (other,) = pressed(walk(steps=1, origin=(-127.9987, 64.0007, 0.0)), SNOW)
+    here, (first,) = pressed(walk(steps=1, origin=(0.0013, 0.0007, 0.0)), SNOW)
+    far, (other,) = pressed(walk(steps=1, origin=(-127.9987, 64.0007, 0.0)), SNOW)
     window = Window(other.window.column + 12800, other.window.row - 6400, *other.window[2:])
-    assert window == one.window
-    assert there.read(other.window) == pytest.approx(here.read(one.window), abs=1e-9)
+    assert window == first.window
+    assert far.read(other.window) == pytest.approx(here.read(first.window), abs=1e-9)
 
 
 def test_a_constant_float_of_the_animation_does_not_change_the_print():
@@ -198,14 +198,14 @@ def test_a_second_step_in_the_same_place_adds_only_what_exceeds_the_first():
 
 
 def test_characters_that_do_not_meet_print_as_if_alone_in_any_order():
-    one, other = walk(steps=2), walk(steps=2, origin=(0.2, 3.0, 0.0), heading=0.5, name="other")
-    alone = [pressed(loads, SNOW)[1] for loads in (one, other)]
-    for order in ([one, other], [other, one]):
+    first, other = walk(steps=2), walk(steps=2, origin=(0.2, 3.0, 0.0), heading=0.5, name="other")
+    alone = [pressed(loads, SNOW)[1] for loads in (first, other)]
+    for order in ([first, other], [other, first]):
         _, footprints = pressed(order, SNOW)
         for name, expected in zip(("walker", "other"), alone, strict=True):
-            found = [footprint for footprint in footprints if footprint.character == name]
-            assert [f.compressed_m3 for f in found] == [f.compressed_m3 for f in expected]
-            assert [f.rim_m3 for f in found] == [f.rim_m3 for f in expected]
+            of_character = [footprint for footprint in footprints if footprint.character == name]
+            assert [f.compressed_m3 for f in of_character] == [f.compressed_m3 for f in expected]
+            assert [f.rim_m3 for f in of_character] == [f.rim_m3 for f in expected]
 
 
 @pytest.mark.parametrize("frame_rate", [24.0, 120.0])
@@ -354,28 +354,28 @@ def test_a_foot_of_a_body_of_known_height_that_slides_prints_place_after_place(s
     loads = loads_of([box_sole(0.25, 0.09)], [transforms], np.full((count, 1), 500.0), np.ones((count, 1), bool), 30.0)
     skin = LowSkin(loads.motion.frames, np.zeros((count, 1, 3)), np.zeros((count, 1)), 0.3, 1.78)
     known = replace(loads, motion=replace(loads.motion, skin=skin))
-    whole, (one,) = pressed(loads, SNOW)
-    ground, found = pressed(known, SNOW)
-    assert len(found) == prints
-    places = np.array([0.0] + [footprint.position[0] for footprint in found] + [slide])
+    whole, (first,) = pressed(loads, SNOW)
+    ground, pressed_prints = pressed(known, SNOW)
+    assert len(pressed_prints) == prints
+    places = np.array([0.0] + [footprint.position[0] for footprint in pressed_prints] + [slide])
     assert np.diff(places).max() < slide / prints + 0.05  # evenly along the way
     step = 1 / 4
-    for footprint, after in pairwise(found):
+    for footprint, after in pairwise(pressed_prints):
         assert after.start_frame - footprint.end_frame == pytest.approx(step)
     along = np.linspace(0.0, slide, 50)
     np.testing.assert_allclose(ground.sample(along, 0 * along)[0], whole.sample(along, 0 * along)[0], rtol=0.25)
-    assert sum(footprint.compressed_m3 for footprint in found) == pytest.approx(one.compressed_m3, rel=0.1)
+    assert sum(footprint.compressed_m3 for footprint in pressed_prints) == pytest.approx(first.compressed_m3, rel=0.1)
 
 
 def test_tiny_and_giant_characters_print_alike_in_proportion():
     # Lengths times k, forces times k² (the same stress) on layers k times as deep: depths times k.
     for k in (0.05, 20.0):
         material = replace(SNOW, layer_depth=0.3 * k, rim_reach=0.04 * k)
-        _, (one,) = pressed(standing(box_sole(0.25, 0.09), [[0, 0, 0]], 500.0), SNOW)
+        _, (footprint,) = pressed(standing(box_sole(0.25, 0.09), [[0, 0, 0]], 500.0), SNOW)
         sole = box_sole(0.25 * k, 0.09 * k, spacing=0.005 * k)
         _, (other,) = pressed(standing(sole, [[0, 0, 0]], 500.0 * k**2), material, 0.01 * k)
-        assert other.max_depth_m == pytest.approx(k * one.max_depth_m, rel=1e-6)
-        assert other.compressed_m3 == pytest.approx(k**3 * one.compressed_m3, rel=1e-6)
+        assert other.max_depth_m == pytest.approx(k * footprint.max_depth_m, rel=1e-6)
+        assert other.compressed_m3 == pytest.approx(k**3 * footprint.compressed_m3, rel=1e-6)
 
 
 def test_a_mouse_on_coarse_cells_presses_its_volume():

@@ -44,13 +44,13 @@ def record():
 class Heard:
     """What a bake throws: its pieces, its record, and the volume of each footprint [m³]."""
 
-    def __init__(self, loads, left, height=flat, surface="sand"):
-        if not left.throws:
-            left = replace(left, throws=step_throws.throws_of(loads, left.footprints, surface=surface))
-        found = debris.sources(left.throws, left.steps, surface=surface, gravity=GRAVITY)
-        self.pieces = debris.throw(found, surface=surface, gravity=GRAVITY, height=height)
-        self.record = replace(left, thrown=debris.volumes(found))
-        self.volume = np.array([sum(self.record.thrown.get(n, {}).values()) for n in range(len(left.footprints))])
+    def __init__(self, loads, record, height=flat, surface="sand"):
+        if not record.throws:
+            record = replace(record, throws=step_throws.throws_of(loads, record.footprints, surface=surface))
+        pieces = debris.sources(record.throws, record.steps, surface=surface, gravity=GRAVITY)
+        self.pieces = debris.throw(pieces, surface=surface, gravity=GRAVITY, height=height)
+        self.record = replace(record, thrown=debris.volumes(pieces))
+        self.volume = np.array([sum(self.record.thrown.get(n, {}).values()) for n in range(len(record.footprints))])
 
     def __getattr__(self, name):
         return getattr(self.pieces, name)
@@ -64,14 +64,14 @@ def thrown(speed, record, height=flat, surface="sand"):
 def test_a_landing_throws_what_the_formula_says_by_hand(record, speed):
     loads = jump(speed)
     heard = thrown(speed, record)
-    for number, one in enumerate(record):
-        radius = np.sqrt(one.area_m2 / 2 / np.pi)
+    for number, throw in enumerate(record):
+        radius = np.sqrt(throw.area_m2 / 2 / np.pi)
         share = np.clip(0.05 * (speed**2 / (GRAVITY * radius) - 1), 0, 0.3)
-        total = np.concatenate([[0], np.cumsum(np.asarray(one.compression.amounts, float))])
-        volumes = np.diff(total[np.asarray(one.compression.first)])
+        total = np.concatenate([[0], np.cumsum(np.asarray(throw.compression.amounts, float))])
+        volumes = np.diff(total[np.asarray(throw.compression.first)])
         start = next(p for p in phases.phases(loads) if p.kind == "land").at / 1.0 + 1.0
-        early = volumes[np.asarray(one.compression.frames) <= start + 12 + 1e-6].sum() / volumes.sum()
-        assert heard.volume[number] == pytest.approx(share * early * one.compressed_m3, rel=1e-6, abs=1e-15)
+        early = volumes[np.asarray(throw.compression.frames) <= start + 12 + 1e-6].sum() / volumes.sum()
+        assert heard.volume[number] == pytest.approx(share * early * throw.compressed_m3, rel=1e-6, abs=1e-15)
     spheres = np.bincount(heard.step, 4 / 3 * np.pi * heard.radius**3, len(record))
     assert spheres == pytest.approx(heard.volume, rel=1e-9, abs=1e-15)
     assert (len(heard.birth) == 0) == (speed < 0.5)
@@ -135,9 +135,9 @@ def test_what_has_come_down_lies_on_the_ground(record):
 def test_a_cloud_rises_and_reaches_on_average_as_the_closed_forms_of_ballistics_integrate_to(record, speed):
     """Without drag: from the ring's area between .5 and 1.2 radii, at .7·sqrt(g·R)·(r/R)^(-1/.55), 35 to 55° up."""
     heard = thrown(speed, record)
-    one = record[0]
+    throw = record[0]
     ring = (heard.kind == ThrowKind.LANDING) & (heard.step == 0)
-    radius = np.sqrt(one.area_m2 / 2 / np.pi)
+    radius = np.sqrt(throw.area_m2 / 2 / np.pi)
     distance, angle = np.meshgrid(
         np.sqrt(np.linspace(0.5**2, 1.2**2, 2001)), np.radians(debris.CORONA + debris.SPREAD * np.linspace(-1, 1, 201))
     )
@@ -176,22 +176,22 @@ def test_plumes_are_fine_and_their_mist_comes_down_last(record, surface):
 
 
 def test_all_steps_of_a_long_run_share_the_pieces_that_a_bake_has(record):
-    left = replace(thrown(4.0, record).record, thrown={})
-    found = debris.sources(left.throws, left.steps, surface="sand", gravity=GRAVITY) * 60
-    heard = debris.throw(found, surface="sand", gravity=GRAVITY, height=flat)
+    bare = replace(thrown(4.0, record).record, thrown={})
+    pieces = debris.sources(bare.throws, bare.steps, surface="sand", gravity=GRAVITY) * 60
+    heard = debris.throw(pieces, surface="sand", gravity=GRAVITY, height=flat)
     assert 0.5 * debris.ALL_PIECES < len(heard.birth) <= debris.ALL_PIECES
-    assert 4 / 3 * np.pi * (heard.radius**3).sum() == pytest.approx(sum(one.volume for one in found), rel=1e-9)
+    assert 4 / 3 * np.pi * (heard.radius**3).sum() == pytest.approx(sum(each.volume for each in pieces), rel=1e-9)
 
 
 def test_a_slice_asks_for_the_ground_under_few_of_many_pieces(record):
-    left = replace(thrown(4.0, record).record, thrown={})
-    found, asked = debris.sources(left.throws, left.steps, surface="sand", gravity=GRAVITY) * 60, [0]
+    bare = replace(thrown(4.0, record).record, thrown={})
+    pieces, asked = debris.sources(bare.throws, bare.steps, surface="sand", gravity=GRAVITY) * 60, [0]
 
     def counted(x, y):
         asked[-1] += len(x)
         return flat(x, y)
 
-    for _ in debris.throw.slices(found, surface="sand", gravity=GRAVITY, height=counted):
+    for _ in debris.throw.slices(pieces, surface="sand", gravity=GRAVITY, height=counted):
         asked.append(0)
     assert sum(asked) > debris.ALL_PIECES
     assert max(asked) <= 2 * debris.TOGETHER
@@ -199,14 +199,14 @@ def test_a_slice_asks_for_the_ground_under_few_of_many_pieces(record):
 
 def test_the_rim_lacks_what_was_thrown(record):
     heard = thrown(4.0, record)
-    for one, volume in zip(record, heard.volume, strict=True):
+    for throw, volume in zip(record, heard.volume, strict=True):
         assert volume > 0
-        left = throws.booked(one, volume)
-        change = left.tile(left.rim).sum() * left.cell_size**2
-        before = one.tile(one.rim).sum() * one.cell_size**2
+        booked = throws.booked(throw, volume)
+        change = booked.tile(booked.rim).sum() * booked.cell_size**2
+        before = throw.tile(throw.rim).sum() * throw.cell_size**2
         assert change + volume == pytest.approx(before, rel=1e-6)
-        assert left.rim_m3 + volume == pytest.approx(one.rim_m3, rel=1e-12)
-        assert left.compression is one.compression
+        assert booked.rim_m3 + volume == pytest.approx(throw.rim_m3, rel=1e-12)
+        assert booked.compression is throw.compression
 
 
 def test_events_tell_the_mass_that_each_phase_throws(record):
@@ -226,20 +226,20 @@ def test_the_same_bake_throws_the_same(record):
 
 def test_edited_steps_throw_where_when_and_as_much_as_they_press(record):
     """A muted step throws nothing; what a moved and turned one throws moves and turns with it."""
-    count, one = len(record), record[0]
-    turned = replace(one, position=one.position + np.array([0.5, -0.2, 0.1]), heading=one.heading + np.pi / 2)
+    count, throw = len(record), record[0]
+    turned = replace(throw, position=throw.position + np.array([0.5, -0.2, 0.1]), heading=throw.heading + np.pi / 2)
     later = replace(record[1], start_frame=record[1].start_frame + 6, end_frame=record[1].end_frame + 6)
     edits = {
-        step_id(one): StepEdit(move_m=(0.5, -0.2), turn_deg=90.0),
+        step_id(throw): StepEdit(move_m=(0.5, -0.2), turn_deg=90.0),
         step_id(record[1]): StepEdit(mute=True),
         step_id(record[1], 1): StepEdit(shift_frames=6),
     }
     plain = thrown(4.0, record)
-    left = replace(plain.record, edits=edits, pressed_again={0: turned, 1: None, 1 + count: later}, thrown={})
-    heard = Heard([], left)
+    edited = replace(plain.record, edits=edits, pressed_again={0: turned, 1: None, 1 + count: later}, thrown={})
+    heard = Heard([], edited)
     assert set(heard.step) == {0, 1 + count}
     before, after = plain.step == 0, heard.step == 0
-    offset, way = (plain.start - one.position)[before], plain.velocity[before]
+    offset, way = (plain.start - throw.position)[before], plain.velocity[before]
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     # each ring is drawn anew around its middle: its pieces are as far from it, and as fast
     assert heard.radius[after] == pytest.approx(plain.radius[before], rel=1e-6)
@@ -255,16 +255,16 @@ def test_edited_steps_throw_where_when_and_as_much_as_they_press(record):
 
 
 def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(record):
-    left = thrown(4.0, record).record
-    content = dump(left)
+    booked = thrown(4.0, record).record
+    content = dump(booked)
     again = load(content)
     assert dump(again) == content
-    assert again.thrown == left.thrown
-    assert [throws.to_json(one) for one in again.throws] == [throws.to_json(one) for one in left.throws]
-    for one, other in zip(left.throws, again.throws, strict=True):
-        assert np.array_equal(one.samples, other.samples)
-    row = throws.to_json(left.throws[0])
-    samples = {"shape": [1, 10], "samples": throws.to_json(replace(left.throws[0], samples=np.full((1, 10), np.nan)))}
+    assert again.thrown == booked.thrown
+    assert [throws.to_json(throw) for throw in again.throws] == [throws.to_json(throw) for throw in booked.throws]
+    for throw, other in zip(booked.throws, again.throws, strict=True):
+        assert np.array_equal(throw.samples, other.samples)
+    row = throws.to_json(booked.throws[0])
+    samples = {"shape": [1, 10], "samples": throws.to_json(replace(booked.throws[0], samples=np.full((1, 10), np.nan)))}
     for forged in (
         {"number": len(record)},
         {"number": True},
@@ -280,7 +280,9 @@ def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(r
 
 
 def test_a_step_that_is_twice_as_large_throws_from_twice_as_far(record):
-    (way,) = [one for one in thrown(4.0, record).record.throws if one.number == 0 and one.kind == ThrowKind.LANDING]
+    (way,) = [
+        throw for throw in thrown(4.0, record).record.throws if throw.number == 0 and throw.kind == ThrowKind.LANDING
+    ]
     larger = way.placed(record[0], record[0], StepEdit(scale=2.0))
     points, velocities = way.followed()
     assert larger.followed()[0] - record[0].position == pytest.approx(2 * (points - record[0].position), abs=1e-6)
@@ -299,7 +301,7 @@ def test_a_sole_that_slides_under_load_throws_what_it_drags_off_ahead_of_itself(
     _, record = pressed(loads, SAND, cell_size=0.02)
     heard = Heard([loads], BakeRecord(record, {}))
     assert set(heard.kind) == {1}
-    by_hand = sum(np.sqrt(one.area_m2) / 2 * 2e-3 * 1.0 for one in record)
+    by_hand = sum(np.sqrt(throw.area_m2) / 2 * 2e-3 * 1.0 for throw in record)
     assert heard.volume.sum() == pytest.approx(by_hand, rel=0.03)
     speed = np.linalg.norm(heard.velocity, axis=1)
     assert speed.mean() == pytest.approx(0.7 * 2.0 * 0.95, rel=0.03)  # between 0.7 and 1.2 of it at random
@@ -322,7 +324,7 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     _, record = pressed(lifted, SAND, cell_size=0.02)
     heard = Heard([lifted], BakeRecord(record, {}), surface="wet_sand")
     assert set(heard.kind) == {2}
-    film = SURFACES["wet_sand"].thrown.film * sum(one.area_m2 for one in record)
+    film = SURFACES["wet_sand"].thrown.film * sum(throw.area_m2 for throw in record)
     assert heard.volume.sum() <= film
     assert heard.birth.min() >= lifted.motion.frames[99]
     shed = np.sort(heard.birth - heard.birth.min()) / 120
@@ -339,13 +341,13 @@ def test_boots_leave_mud_with_a_few_drops_of_many_sizes_in_lumps():
     heard = Heard([loads], BakeRecord(record, {}), surface="mud")
     places = flight.position(heard.start, heard.velocity, heard.drag_time, heard.time, GRAVITY)
     for number in np.unique(heard.step[heard.kind == ThrowKind.SHED]):
-        own = (heard.step == number) & (heard.kind == ThrowKind.SHED)
-        grams = 4 / 3 * np.pi * heard.radius[own] ** 3 * SURFACES["mud"].density * 1e3
+        of_step = (heard.step == number) & (heard.kind == ThrowKind.SHED)
+        grams = 4 / 3 * np.pi * heard.radius[of_step] ** 3 * SURFACES["mud"].density * 1e3
         assert 5 < grams.sum() < 15
         assert grams.max() < 0.5 * grams.sum()
-        assert 20 < own.sum() < 200
-        assert len(np.unique(np.round(heard.birth[own] * 4))) <= 2 * SURFACES["mud"].thrown.lumps
-        assert np.ptp(places[own, 1]) > 0.1  # a foot is as wide
+        assert 20 < of_step.sum() < 200
+        assert len(np.unique(np.round(heard.birth[of_step] * 4))) <= 2 * SURFACES["mud"].thrown.lumps
+        assert np.ptp(places[of_step, 1]) > 0.1  # a foot is as wide
     diameter = 2e3 * heard.radius[heard.kind == ThrowKind.SHED]
     assert np.percentile(diameter, 99) > 4 * np.percentile(diameter, 10)
 

@@ -20,10 +20,10 @@ from tests.core.walkers import GRAVITY, pressed, walk
 
 def exponent(diameters, smallest, largest):
     """The a of n(d) ~ d^-a between two sizes that is most likely, and its standard deviation."""
-    found = np.log(diameters[(diameters >= smallest) & (diameters <= largest)])
+    sizes = np.log(diameters[(diameters >= smallest) & (diameters <= largest)])
 
     def unlikely(a):
-        return a * found.sum() + len(found) * np.log((largest ** (1 - a) - smallest ** (1 - a)) / (1 - a))
+        return a * sizes.sum() + len(sizes) * np.log((largest ** (1 - a) - smallest ** (1 - a)) / (1 - a))
 
     a, step = minimize_scalar(unlikely, bounds=(1.05, 6), method="bounded").x, 1e-2
     bend = (unlikely(a + step) + unlikely(a - step) - 2 * unlikely(a)) / step**2
@@ -42,13 +42,13 @@ def scattered(record, surface):
     """Prints with the crumbs about each."""
     return [
         relief_of_print(
-            one,
+            footprint,
             amounts.of_look(surface),
             blur_sigma=MATERIALS[surface].blur_sigma,
             finest=SPACING,
             seed=zlib.crc32(bytes([number])),
         )
-        for number, one in enumerate(record.footprints)
+        for number, footprint in enumerate(record.footprints)
     ]
 
 
@@ -56,7 +56,7 @@ def scattered(record, surface):
 def test_sizes_of_both_together_follow_the_one_law(surface):
     record = baked(surface)
     lying = np.concatenate(
-        [2 * lattice.radius[lattice.radius > 0] for one in scattered(record, surface) for lattice in one.crumbs]
+        [2 * lattice.radius[lattice.radius > 0] for each in scattered(record, surface) for lattice in each.crumbs]
     )
     sources = debris.sources(record.throws, record.steps, surface=surface, gravity=GRAVITY)
     thrown = 2 * debris.throw(sources, surface=surface, gravity=GRAVITY, height=lambda x, _: 0 * x).radius
@@ -73,9 +73,9 @@ def test_sizes_of_both_together_follow_the_one_law(surface):
 
 def test_what_lies_about_a_print_is_the_upper_side_of_what_flies():
     """Each crumb, alone, is as high at its middle as its lump is there, less what is sunk of it."""
-    (one, *_) = scattered(baked("soil"), "soil")
+    (step, *_) = scattered(baked("soil"), "soil")
     lumps = crumbs.lumps("soil")
-    lattice = one.crumbs[-1]
+    lattice = step.crumbs[-1]
     crumbs_there = list(zip(*np.nonzero(lattice.radius), strict=True))
     for crumb in crumbs_there:
         place = [np.array([at[crumb]]) for at in (lattice.x, lattice.y)]
@@ -107,6 +107,6 @@ def test_lattices_filled_alike_would_not_follow_the_law(monkeypatch):
     monkeypatch.setattr(crumbs, "octaves", lambda largest, _: ((largest / 2**number, 1.0) for number in range(3)))
     record = replace(baked("soil"), throws=[])
     lying = np.concatenate(
-        [2 * each.radius[each.radius > 0] for one in scattered(record, "soil") for each in one.crumbs]
+        [2 * each.radius[each.radius > 0] for item in scattered(record, "soil") for each in item.crumbs]
     )
     assert exponent(lying, lying.min(), lying.max())[0] > 2.75

@@ -56,10 +56,10 @@ def test_midi_notes_are_read_with_their_times_and_velocities():
 
 
 def assert_notes(notes):
-    assert [one[0] for one in notes] == pytest.approx([row["time_s"] for row in LANDINGS], abs=1 / 960)
-    assert [one[3] - one[0] for one in notes] == pytest.approx([0.6] * 3, abs=2 / 960)
-    assert [one[1] for one in notes] == [36, 49, 38]
-    assert [one[2] for one in notes] == [round(127 * (f / 3) ** 0.7) for f in (1.1, 2.4, 3.0)]
+    assert [note[0] for note in notes] == pytest.approx([row["time_s"] for row in LANDINGS], abs=1 / 960)
+    assert [note[3] - note[0] for note in notes] == pytest.approx([0.6] * 3, abs=2 / 960)
+    assert [note[1] for note in notes] == [36, 49, 38]
+    assert [note[2] for note in notes] == [round(127 * (f / 3) ** 0.7) for f in (1.1, 2.4, 3.0)]
 
 
 def test_a_hard_floor_has_notes_of_its_own():
@@ -108,7 +108,7 @@ def test_midi_is_as_its_standard_says():
             if status >> 4 == 0x9:
                 notes.append([tick / 960, first, second, None])
             elif status >> 4 == 0x8:
-                next(one for one in reversed(notes) if one[1] == first)[3] = tick / 960
+                next(note for note in reversed(notes) if note[1] == first)[3] = tick / 960
     assert ended
     assert_notes(notes)
 
@@ -128,11 +128,11 @@ def test_resolve_reads_one_marker_at_each_frame():
     lines = event_files.edl(EVENTS, frame_rate=RATE).splitlines()
     assert lines[:2] == ["TITLE: SoftGround", "FCM: NON-DROP FRAME"]
     cut = re.compile(r"(\d{3})  001      V     C        (\S{11}) (\S{11}) (\S{11}) (\S{11})  ")
-    cuts = [found for line in lines if (found := cut.fullmatch(line))]
+    cuts = [match for line in lines if (match := cut.fullmatch(line))]
     marks = [line for line in lines if line.startswith(" |")]
     assert len(cuts) == len(marks) == len(EVENTS)
-    for row, one in zip(EVENTS, cuts, strict=True):
-        hours, minutes, seconds, frames = map(int, one[2].split(":"))
+    for row, match in zip(EVENTS, cuts, strict=True):
+        hours, minutes, seconds, frames = map(int, match[2].split(":"))
         frame = ((hours * 60 + minutes) * 60 + seconds) * 24 + frames - 3600 * 24
         assert frame == np.rint(row["time_s"] * 24)
     assert marks[0] == " |C:ResolveColorBlue |M:Ina foot.L heel strike |D:1"
@@ -142,10 +142,10 @@ def test_opentimelineio_reads_markers_with_all_that_is_known():
     otio = pytest.importorskip("opentimelineio")
     timeline = otio.adapters.read_from_string(event_files.otio(EVENTS, frame_rate=RATE), "otio_json")
     markers = timeline.tracks[0].markers
-    assert [one.name for one in markers][:2] == ["Ina foot.L heel strike", "Ina foot.L foot flat"]
-    for row, one in zip(EVENTS, markers, strict=True):
-        assert one.marked_range.start_time.to_seconds() == pytest.approx(row["time_s"], abs=1e-4)
-        assert dict(one.metadata["softground"]) == row
+    assert [marker.name for marker in markers][:2] == ["Ina foot.L heel strike", "Ina foot.L foot flat"]
+    for row, marker in zip(EVENTS, markers, strict=True):
+        assert marker.marked_range.start_time.to_seconds() == pytest.approx(row["time_s"], abs=1e-4)
+        assert dict(marker.metadata["softground"]) == row
     assert timeline.tracks[0].range_of_child_at_index(0).duration.to_seconds() == pytest.approx(3662.1)
 
 
@@ -154,9 +154,9 @@ def test_opentimelineio_is_in_schemas_of_its_first_versions():
     assert timeline["OTIO_SCHEMA"] == "Timeline.1"
     (track,) = timeline["tracks"]["children"]
     assert (track["OTIO_SCHEMA"], track["kind"]) == ("Track.1", "Audio")
-    assert {one["OTIO_SCHEMA"] for one in track["markers"]} == {"Marker.2"}
-    starts = [one["marked_range"]["start_time"] for one in track["markers"]]
-    assert [one["value"] / one["rate"] for one in starts] == pytest.approx([row["time_s"] for row in EVENTS])
+    assert {marker["OTIO_SCHEMA"] for marker in track["markers"]} == {"Marker.2"}
+    starts = [marker["marked_range"]["start_time"] for marker in track["markers"]]
+    assert [start["value"] / start["rate"] for start in starts] == pytest.approx([row["time_s"] for row in EVENTS])
 
 
 def test_no_events_are_files_too():

@@ -50,15 +50,15 @@ def test_a_walk_strikes_rolls_and_leaves_when_its_closed_form_says(baked, table)
 
 def test_forces_areas_and_depths_are_those_of_the_steps(baked, table):
     loads, footprints = baked
-    steps = {step_id(one): one for one in footprints}
+    steps = {step_id(footprint): footprint for footprint in footprints}
     for row in table:
         assert row["area_m2"] == pytest.approx(steps[row["step"]].area_m2, abs=1e-6)
         assert row["depth_m"] == pytest.approx(steps[row["step"]].max_depth_m, abs=1e-6)
         assert row["peak_bw"] == pytest.approx(row["peak_force_n"] / (MASS * GRAVITY), abs=1e-4)
-    for name, one in steps.items():
+    for name, step in steps.items():
         rows = [row for row in table if row["step"] == name and row["phase"] not in ("toe_off",)]
-        assert max(row["peak_force_n"] for row in rows) == pytest.approx(one.peak_force_n, abs=0.006)
-        impulse = one.load_n.sum() * loads.motion.time_step
+        assert max(row["peak_force_n"] for row in rows) == pytest.approx(step.peak_force_n, abs=0.006)
+        impulse = step.load_n.sum() * loads.motion.time_step
         assert sum(row["impulse_ns"] for row in rows) == pytest.approx(impulse, rel=1e-3)
 
 
@@ -142,9 +142,9 @@ def test_muted_steps_have_no_events_and_moved_ones_take_them_along(baked, table)
     _, footprints = baked
     muted, moved = map(step_id, footprints[:2])
     elsewhere = replace(footprints[1], position=footprints[1].position + np.array([1, 2, 0]))
-    left = BakeRecord(footprints, {}, {muted: StepEdit(mute=True), moved: StepEdit(turn_deg=1.0)}, {1: elsewhere})
-    rows = as_edited(table, left.steps)
-    assert {row["step"] for row in rows} == {step_id(one) for one in footprints[1:]}
+    record = BakeRecord(footprints, {}, {muted: StepEdit(mute=True), moved: StepEdit(turn_deg=1.0)}, {1: elsewhere})
+    rows = as_edited(table, record.steps)
+    assert {row["step"] for row in rows} == {step_id(footprint) for footprint in footprints[1:]}
     for before, after in zip(
         [row for row in table if row["step"] == moved], [row for row in rows if row["step"] == moved], strict=True
     ):
@@ -153,12 +153,12 @@ def test_muted_steps_have_no_events_and_moved_ones_take_them_along(baked, table)
 
 def test_a_copy_has_the_events_of_its_step_when_it_presses(baked, table):
     _, footprints = baked
-    count, one = len(footprints), footprints[1]
-    later = replace(one, start_frame=one.start_frame + 6, end_frame=one.end_frame + 6)
-    left = BakeRecord(footprints, {}, {step_id(one, 1): StepEdit(shift_frames=6)}, {1 + count: later})
-    rows = as_edited(table, left.steps)
-    of_step, of_copy = ([row for row in rows if row["step"] == step_id(one, copy)] for copy in (0, 1))
-    assert [row for row in rows if row["step"] != step_id(one, 1)] == table
+    count, footprint = len(footprints), footprints[1]
+    later = replace(footprint, start_frame=footprint.start_frame + 6, end_frame=footprint.end_frame + 6)
+    record = BakeRecord(footprints, {}, {step_id(footprint, 1): StepEdit(shift_frames=6)}, {1 + count: later})
+    rows = as_edited(table, record.steps)
+    of_step, of_copy = ([row for row in rows if row["step"] == step_id(footprint, copy)] for copy in (0, 1))
+    assert [row for row in rows if row["step"] != step_id(footprint, 1)] == table
     assert [row["phase"] for row in of_copy] == [row["phase"] for row in of_step] != []
     assert [row["frame"] - 6 for row in of_copy] == pytest.approx([row["frame"] for row in of_step], abs=1e-5)
     assert [row["time_s"] - 6 / 30 for row in of_copy] == pytest.approx([row["time_s"] for row in of_step], abs=1e-5)

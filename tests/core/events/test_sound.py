@@ -29,17 +29,17 @@ def loads():
 @pytest.fixture(scope="module")
 def grounds(loads):
     """By surface: events and steps of the same walk."""
-    found = {}
+    spectra = {}
     for name, surface in GROUNDS.items():
         _, footprints = pressed(loads, find(name).material, cell_size=0.03)
         table = events([loads], footprints, surface=surface, first_frame=1.0)
-        found[surface] = (
+        spectra[surface] = (
             table,
             sound.steps_of(
                 dict(zip(map(step_id, footprints), footprints, strict=True)), table, frame_rate=30.0, first_frame=1.0
             ),
         )
-    return found
+    return spectra
 
 
 def centroid(heard):
@@ -96,8 +96,8 @@ def test_pitch_and_length_are_those_of_the_surface(grounds, surface, low, high):
 def test_a_step_on_a_hard_floor_clicks_as_it_comes_down_and_no_print_is_needed(loads):
     """In time with its strike, short, and not as on any ground that gives way; as loud as the force."""
     hard = loads.contacts.touching & (np.arange(2) == 0)
-    there = replace(loads, contacts=replace(loads.contacts, touching=loads.contacts.touching & ~hard, hard=hard))
-    table = events([there], [], surface="snow", first_frame=1.0)
+    on_floor = replace(loads, contacts=replace(loads.contacts, touching=loads.contacts.touching & ~hard, hard=hard))
+    table = events([on_floor], [], surface="snow", first_frame=1.0)
     strikes = [row for row in table if row["phase"] == "heel_strike" and row["contact"] == "foot.L"]
     steps = sound.steps_of({}, table, frame_rate=30.0, first_frame=1.0)
     assert [step.struck for step in steps] == pytest.approx([row["time_s"] for row in strikes], abs=1e-6)
@@ -110,7 +110,7 @@ def test_a_step_on_a_hard_floor_clicks_as_it_comes_down_and_no_print_is_needed(l
         assert lasting(heard) < 0.2
         assert step.position == pytest.approx(row["position"])
         assert trapezoid(step.force, step.time) == pytest.approx(
-            sum(one["impulse_ns"] for one in table if one["contact"] == "foot.L" and one["phase"] != "toe_off") / 2,
+            sum(each["impulse_ns"] for each in table if each["contact"] == "foot.L" and each["phase"] != "toe_off") / 2,
             rel=0.2,
         )
     assert sound.step_sound(replace(steps[0], force=2 * steps[0].force))[1].std() == pytest.approx(
@@ -152,9 +152,9 @@ def test_no_two_steps_are_alike_and_the_same_bake_gives_the_same_bytes(grounds):
     steps = grounds["snow"][1]
     once, again = (wave_file.dump(sound.footsteps(steps, 3.0)) for _ in range(2))
     assert once == again
-    one = steps[1]
-    other = replace(one, name="walker/foot.L@99.0")
-    first, second = sound.step_sound(one)[1], sound.step_sound(other)[1]
+    step = steps[1]
+    other = replace(step, name="walker/foot.L@99.0")
+    first, second = sound.step_sound(step)[1], sound.step_sound(other)[1]
     assert abs(np.corrcoef(first, second)[0, 1]) < 0.5
 
 
@@ -170,7 +170,7 @@ def test_a_file_is_read_by_pythons_own_reader(grounds):
 
 
 def test_two_channels_have_the_gains_that_are_asked_for(grounds):
-    steps = [replace(one, gains=(0.3, 0.6)) for one in grounds["sand"][1]]
+    steps = [replace(each, gains=(0.3, 0.6)) for each in grounds["sand"][1]]
     heard = sound.footsteps(steps, 3.0)
     assert heard.shape == (3 * RATE, 2)
     np.testing.assert_allclose(heard[:, 1], 2 * heard[:, 0], rtol=1e-6, atol=1e-12)
@@ -178,7 +178,7 @@ def test_two_channels_have_the_gains_that_are_asked_for(grounds):
 
 @pytest.mark.parametrize("seconds", [0.05, 0.5, 100.0])
 def test_steps_beyond_the_ends_are_cut(grounds, seconds):
-    steps = [later(one, by) for by in (-5, -1, 1) for one in grounds["mud"][1]]
+    steps = [later(each, by) for by in (-5, -1, 1) for each in grounds["mud"][1]]
     assert np.isfinite(sound.footsteps(steps, seconds)).all()
 
 
@@ -191,7 +191,7 @@ def test_an_artists_own_sounds_play_at_the_strikes_as_loud_as_the_forces(grounds
             file.setframerate(44_100)
             file.writeframes(np.repeat(np.rint(tone * part * 32767), 2).astype("<i2").tobytes())
     recordings = [(path.name, wave_file.read(path)) for path in sorted(tmp_path.iterdir())]
-    assert all(np.abs(one).max() == pytest.approx(1.0) for _, one in recordings)
+    assert all(np.abs(recording).max() == pytest.approx(1.0) for _, recording in recordings)
     assert len(recordings[0][1]) == pytest.approx(4410 * 48 / 44.1, abs=2)
     steps = grounds["snow"][1]
     heard = sound.footsteps(steps, 3.0, recordings)[:, 0]
@@ -211,7 +211,7 @@ def test_a_recording_that_is_none_is_named(tmp_path, spoil):
 
 
 def test_a_minute_of_walking_takes_less_than_five_seconds(grounds):
-    steps = [replace(later(one, 2 * k), name=f"{one.name}{k}") for k in range(28) for one in grounds["snow"][1]]
+    steps = [replace(later(each, 2 * k), name=f"{each.name}{k}") for k in range(28) for each in grounds["snow"][1]]
     begun = time.process_time()
     sound.footsteps(steps, 60.0)
     assert len(steps) > 110

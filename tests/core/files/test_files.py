@@ -188,10 +188,10 @@ def test_what_another_machine_writes_is_left_to_it(tmp_path: Path, monkeypatch: 
 
 def test_two_writers_of_one_file_do_not_share_a_name(tmp_path: Path):
     path = tmp_path / "010.blend"
-    with replacing(path) as one, replacing(path) as other:  # as in two containers with the same process id
-        one.write_text("one")
+    with replacing(path) as first, replacing(path) as other:  # as in two containers with the same process id
+        first.write_text("one")
         other.write_text("other")
-        assert one != other
+        assert first != other
     assert path.read_text() == "one"
 
 
@@ -201,8 +201,8 @@ def test_what_blenders_own_saving_leaves_is_removed(tmp_path: Path):
     with pytest.raises(InputError), replacing(path) as partial:
         partial.with_name(f"{partial.name}@").write_text("half")  # it ends before it has renamed
     assert list(tmp_path.iterdir()) == [users]
-    left = tmp_path / f"{partial.name}@"
-    left.touch()
+    leftover = tmp_path / f"{partial.name}@"
+    leftover.touch()
     remove_leftovers(path)
     assert list(tmp_path.iterdir()) == [users]
 

@@ -210,9 +210,9 @@ def test_soil_is_the_deeper_the_wetter_and_stays_what_it_is_otherwise(name):
     soil = find(name).material
     moisture = np.linspace(0, 1, 11)
     wetter = [wetted(soil, share) for share in moisture]
-    assert [wetness_of(one) for one in wetter] == pytest.approx(moisture, abs=1e-6)
-    assert (np.diff([boot_depth(one) for one in wetter]) > 0).all()
-    assert all(replace(one, youngs_modulus=soil.youngs_modulus) == soil for one in wetter)
+    assert [wetness_of(each) for each in wetter] == pytest.approx(moisture, abs=1e-6)
+    assert (np.diff([boot_depth(each) for each in wetter]) > 0).all()
+    assert all(replace(each, youngs_modulus=soil.youngs_modulus) == soil for each in wetter)
 
 
 def test_soil_that_is_a_thin_layer_is_wetted_until_it_gives_way_no_further():
@@ -226,9 +226,9 @@ def test_sand_is_deep_dry_and_soaked_and_firm_between(layer):
     assert moisture_of(dune) == 0.0
     moisture = np.linspace(0, 1, 11)
     sand = [moistened(dune, share) for share in moisture]
-    assert [moisture_of(one) for one in sand] == pytest.approx(moisture, abs=0.011)
-    depth = np.array([boot_depth(one) for one in sand])
+    assert [moisture_of(each) for each in sand] == pytest.approx(moisture, abs=0.011)
+    depth = np.array([boot_depth(each) for each in sand])
     assert depth[0] == pytest.approx(boot_depth(dune), rel=0.02)
     assert (np.diff(depth[:7]) < 0).all()
     assert (np.diff(depth[6:]) > 0).all()
-    assert [one.cohesionless for one in (sand[0], sand[3], sand[10])] == [1.0, 0.0, 0.0]
+    assert [each.cohesionless for each in (sand[0], sand[3], sand[10])] == [1.0, 0.0, 0.0]

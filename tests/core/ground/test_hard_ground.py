@@ -55,12 +55,12 @@ def test_a_ground_below_a_bridge_is_pressed_bit_for_bit_as_without_it():
         estimate_loads(motion, terrain, force_model="WHOLE_BODY", material=SNOW) for terrain in (FlatTerrain(), bridge)
     ]
     (_, without), (_, below) = (
-        pressed(one, SNOW, terrain=terrain) for one, terrain in zip(loads, (None, bridge), strict=True)
+        pressed(each, SNOW, terrain=terrain) for each, terrain in zip(loads, (None, bridge), strict=True)
     )
     assert len(without) == len(below) > 4
-    for one, other in zip(without, below, strict=True):
-        assert one.compression.amounts.tobytes() == other.compression.amounts.tobytes()
-        assert one.rim.amounts.tobytes() == other.rim.amounts.tobytes()
+    for footprint, other in zip(without, below, strict=True):
+        assert footprint.compression.amounts.tobytes() == other.compression.amounts.tobytes()
+        assert footprint.rim.amounts.tobytes() == other.rim.amounts.tobytes()
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.5])

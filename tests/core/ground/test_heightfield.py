@@ -29,12 +29,12 @@ def test_a_window_reads_back_what_was_written_and_nothing_else_changed(window, s
 
 
 @given(windows, windows)
-def test_windows_intersect_exactly_when_they_share_a_cell(one, other):
+def test_windows_intersect_exactly_when_they_share_a_cell(first, other):
     cells = [
         {(i, j) for i in range(w.column, w.column + w.columns) for j in range(w.row, w.row + w.rows)}
-        for w in (one, other)
+        for w in (first, other)
     ]
-    assert one.intersects(other) == bool(cells[0] & cells[1])
+    assert first.intersects(other) == bool(cells[0] & cells[1])
 
 
 def test_memory_follows_the_touched_ground_and_not_the_extent():
@@ -94,8 +94,8 @@ def test_of_many_places_only_what_is_found_takes_more_memory():
     values = np.stack([x - 2 * y, 3 * y])
     field.write(window, values)
 
-    def found_and_peak(many):
-        inside = np.random.default_rng(2).integers(0, x.size, many)
+    def found_and_peak(places):
+        inside = np.random.default_rng(2).integers(0, x.size, places)
         px, py = x.ravel()[inside], y.ravel()[inside]
         tracemalloc.start()
         try:
@@ -106,8 +106,8 @@ def test_of_many_places_only_what_is_found_takes_more_memory():
         np.testing.assert_allclose(sampled, values.reshape(2, -1)[:, inside], rtol=0, atol=1e-12)
         return sampled.nbytes, peak
 
-    (few, before), (many, after) = found_and_peak(PLACES_AT_ONCE), found_and_peak(3 * PLACES_AT_ONCE + 5)
-    assert after - before < 1.5 * (many - few)
+    (few, before), (more, after) = found_and_peak(PLACES_AT_ONCE), found_and_peak(3 * PLACES_AT_ONCE + 5)
+    assert after - before < 1.5 * (more - few)
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, np.nan, np.inf])

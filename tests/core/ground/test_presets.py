@@ -30,7 +30,7 @@ PAPER_RANGES = {
 def test_the_presets_are_listed_by_section_and_softness():
     shown = [presets.load(path) for path in SHIPPED]
     sections = {
-        section: [one.name for one in presets.soft_to_firm(one for one in shown if one.section == section)]
+        section: [each.name for each in presets.soft_to_firm(each for each in shown if each.section == section)]
         for section in presets.SECTIONS
     }
     assert sum(map(len, sections.values())) == len(SHIPPED) == 34

@@ -60,11 +60,11 @@ def alone(ground, kind):
     return replace(ground, material=kind.material, regions=None)
 
 
-def same(one, other):
-    """Return whether two prints change the ground by the same bits."""
+def same(first, other):
+    """True if two prints change the ground by the same bits."""
     return all(
         np.array_equal(np.asarray(getattr(a, name)), np.asarray(getattr(b, name)))
-        for a, b in ((one.compression, other.compression), (one.rim, other.rim))
+        for a, b in ((first.compression, other.compression), (first.rim, other.rim))
         for name in ("frames", "cells", "amounts")
     )
 
@@ -113,7 +113,7 @@ def test_one_kind_is_as_if_there_were_no_regions_bit_for_bit():
     numbers = replace(ground.regions.where, values=np.zeros_like(ground.regions.where.values))
     field, prints = pressed(loads, replace(ground, regions=Regions((kind,), numbers)))
     plain, others = pressed(loads, alone(ground, kind))
-    assert all(same(one, other) for one, other in zip(prints, others, strict=True))
+    assert all(same(each, other) for each, other in zip(prints, others, strict=True))
     assert all((field.read(window) == plain.read(window)).all() for window in plain.tile_windows())
 
 
@@ -224,13 +224,13 @@ def test_a_step_that_is_moved_over_a_border_is_pressed_into_what_is_there():
     loads, ground = walk(steps=5), stripes([0.9], (FOUR[3], FOUR[2]))
     _, prints = pressed(loads, ground)
     moved = next(step for step in prints if step.position[0] < 0.5)
-    left = with_edits(BakeRecord(tuple(prints), {}), {step_id(moved): StepEdit(move_m=(3.0, 1.0))}, ground, 0.01)
-    (now,) = left.pressed_again.values()
+    bake = with_edits(BakeRecord(tuple(prints), {}), {step_id(moved): StepEdit(move_m=(3.0, 1.0))}, ground, 0.01)
+    (now,) = bake.pressed_again.values()
     assert (moved.surface, now.surface) == ("mud", "snow")
     assert now.max_depth_m > 1.5 * moved.max_depth_m
-    kept = record.load(record.dump(left))
-    assert [step.surface for step in kept.footprints] == [step.surface for step in prints]
-    assert [step.surface for step in kept.pressed_again.values()] == ["snow"]
+    loaded = record.load(record.dump(bake))
+    assert [step.surface for step in loaded.footprints] == [step.surface for step in prints]
+    assert [step.surface for step in loaded.pressed_again.values()] == ["snow"]
 
 
 def test_a_record_that_names_no_known_surface_is_damaged():

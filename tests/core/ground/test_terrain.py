@@ -145,11 +145,11 @@ def test_values_of_vertices_are_interpolated_as_scipy_does():
     terrain = MeshTerrain.from_mesh(vertices, triangles, values=values)
     x, y = random.uniform(-1.2, 1.2, (2, 20, 20))
     expected = np.moveaxis(LinearNDInterpolator(delaunay, values)(x, y), -1, 0)
-    found = terrain.interpolated(x, y)
+    heights = terrain.interpolated(x, y)
     on_ground = np.isfinite(terrain.heights(x, y))
-    assert found.shape == (2, 20, 20)
-    assert np.allclose(found[:, on_ground], expected[:, on_ground])
-    assert np.isnan(found[:, ~on_ground]).all()
+    assert heights.shape == (2, 20, 20)
+    assert np.allclose(heights[:, on_ground], expected[:, on_ground])
+    assert np.isnan(heights[:, ~on_ground]).all()
 
 
 def test_where_surfaces_lie_one_above_the_other_the_values_are_those_of_the_highest():

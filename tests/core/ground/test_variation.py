@@ -26,7 +26,9 @@ class Bands:
         self.left, self.right = left, right
 
     def factors(self, x, y):
-        return np.stack([np.where(x < 0, one, other) + 0 * y for one, other in zip(self.left, self.right, strict=True)])
+        return np.stack(
+            [np.where(x < 0, each, other) + 0 * y for each, other in zip(self.left, self.right, strict=True)]
+        )
 
 
 def pressed(loads, variation, material=MUD, cell=0.01, **options):
@@ -37,11 +39,11 @@ def pressed(loads, variation, material=MUD, cell=0.01, **options):
 
 
 def test_ground_that_varies_by_nothing_is_as_if_it_did_not_vary():
-    plain, (one, *_) = pressed(walk(steps=2), None)
+    plain, (first, *_) = pressed(walk(steps=2), None)
     varied, (other, *_) = pressed(walk(steps=2), Bands())
     for window in plain.tile_windows():
         assert varied.read(window) == pytest.approx(plain.read(window), abs=1e-9)
-    assert other.rim_m3 == pytest.approx(one.rim_m3, rel=1e-9)
+    assert other.rim_m3 == pytest.approx(first.rim_m3, rel=1e-9)
 
 
 @pytest.mark.parametrize(

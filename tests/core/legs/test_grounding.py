@@ -67,12 +67,12 @@ def walk(frames=90, *, stride=1.2, period=1.1, heading=0.0):
 
 def clearance(motion, ground, touching):
     """Height of the lowest point of each standing sole above the ground, by a denser set of points."""
-    found = []
+    heights = []
     for index, sole in enumerate(motion.soles):
         points = posed_points(sole, underside(sole.sole, edge=0.03))
         z = ground.heights(points[..., 0], points[..., 1], motion.frames[:, None])
-        found.append((points[..., 2] - z).min(axis=1)[touching[:, index]])
-    return np.concatenate(found)
+        heights.append((points[..., 2] - z).min(axis=1)[touching[:, index]])
+    return np.concatenate(heights)
 
 
 def placed(motion, touching, ground, undisturbed=None, **options):
@@ -213,10 +213,10 @@ def test_a_sole_that_never_touches_is_left_alone():
 
 def test_a_sole_without_an_underside_has_no_gap_to_the_ground():
     motion, touching = walk()
-    left = gaps(
+    remaining = gaps(
         motion, touching, GroundHistory(FlatTerrain()), lambda sole: posed_points(sole, [(0, np.empty((0, 3)))])
     )
-    assert not len(left.heights)
+    assert not len(remaining.heights)
 
 
 def test_without_grounding_a_lean_keeps_the_feet_where_they_are():

@@ -63,8 +63,8 @@ def test_their_feet_stand_without_slide_or_gap_and_their_parts_stay_whole(slide,
     for side, number in leg_soles(motion).items():
         for bone in (("hip", "knee"), ("knee", "sole")):
             lengths = []
-            for one in (motion, after):
-                ends = one.joints | {f"sole_{side}": one.soles[number].landmark_positions()[:, 0]}
+            for each in (motion, after):
+                ends = each.joints | {f"sole_{side}": each.soles[number].landmark_positions()[:, 0]}
                 lengths.append(np.linalg.norm(ends[f"{bone[0]}_{side}"] - ends[f"{bone[1]}_{side}"], axis=1))
             np.testing.assert_allclose(lengths[1], lengths[0], atol=1e-6)
 
@@ -76,5 +76,5 @@ def test_a_foot_lock_without_strength_leaves_them_where_they_are():
     hold = FootHold(motion.soles[0].sole.name, motion.frames[first], strength=0.0)
     after = responding(motion, clean(motion, touching, FLOOR, (hold,)))
     end = first + int(np.argmin(touching[first:, 0]))
-    places = [one.soles[0].landmark_positions().mean(axis=1)[first:end] for one in (motion, after)]
+    places = [each.soles[0].landmark_positions().mean(axis=1)[first:end] for each in (motion, after)]
     np.testing.assert_allclose(places[1], places[0], atol=1e-3)

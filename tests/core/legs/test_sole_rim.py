@@ -79,12 +79,12 @@ def planted_slides(under, placement):
     """Distances of planted points from where they were planted (N, 2), of frames turned and shifted (3 F,) as told."""
     turn, shift = placement.reshape(-1, 3)[:, 0], placement.reshape(-1, 3)[:, 1:]
     points = turned_level(turn[:, None], under.points[..., :2]) + shift[:, None]
-    planted, found, first = under.planted(), [], np.zeros_like(points[0])
+    planted, slides, first = under.planted(), [], np.zeros_like(points[0])
     for frame, bears in enumerate(planted):
         new = bears & ~planted[frame - 1] if frame else bears
         first[new] = points[frame][new]
-        found.append((points[frame] - first)[bears])
-    return np.concatenate(found)
+        slides.append((points[frame] - first)[bears])
+    return np.concatenate(slides)
 
 
 @pytest.mark.parametrize("toes", [0.5, -0.3], ids=["toes bend up", "toes follow the heel"])
@@ -98,5 +98,5 @@ def test_no_other_level_way_of_a_bending_sole_would_slide_less(sole, toes):
     held = replace(under, points=carried(lock(under, touching)[:, None], points))
     still = np.zeros(3 * FRAMES)
     best = least_squares(lambda placement: planted_slides(under, placement).ravel(), still, max_nfev=30)
-    left, least = (np.sqrt((found**2).mean()) for found in (planted_slides(held, still), best.fun))
-    assert left < 1.01 * least
+    ours, least = (np.sqrt((slid**2).mean()) for slid in (planted_slides(held, still), best.fun))
+    assert ours < 1.01 * least

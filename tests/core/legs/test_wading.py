@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from softground_addon.core.ground import deep_ground
 from softground_addon.core.legs.foot_placement import posed_points
 from softground_addon.core.legs.hips import hips_follow
 from softground_addon.core.legs.wading import PLOUGH, depth_of_contacts, ploughed
+from softground_addon.core.soles import deep_ground
 from tests.core.legs.test_grounding import Ground, grounded, placed, walk
 from tests.core.walkers import FOOT_LENGTH
 

@@ -94,7 +94,7 @@ def test_the_cells_of_the_estimate_are_those_that_are_pressed_and_laid_out(loads
     monkeypatch.setattr(ContactLayout, "lay_out", counting)
     results = simulate([loads], SoftGround(FlatTerrain(), SNOW), cell_size)
     prints = [footprint for result in results for footprint in result.footprints]
-    changed = sum(len({*one.compression.cells.tolist(), *one.rim.cells.tolist()}) for one in prints)
+    changed = sum(len({*each.compression.cells.tolist(), *each.rim.cells.tolist()}) for each in prints)
     coverage = coverage_of([loads])
     assert 0.5 < coverage.cells(cell_size, SNOW.rim_reach) / changed < 2
     assert 0.5 < coverage.laid_out(cell_size, SNOW.rim_reach) @ coverage.steps / sum(laid_out) < 2

@@ -83,8 +83,8 @@ def test_a_sole_that_the_skin_shows_in_the_air_bears_nothing_whatever_holds_the_
     body = body_dynamics(motion)
 
     def touching(*aloft):
-        found = contacts(np.zeros((120, 2)), np.tile((0.05, 0.06), (120, 1)))
-        return refine_contacts(motion, replace(found, aloft=np.tile(aloft, (120, 1))), body).touching
+        timed = contacts(np.zeros((120, 2)), np.tile((0.05, 0.06), (120, 1)))
+        return refine_contacts(motion, replace(timed, aloft=np.tile(aloft, (120, 1))), body).touching
 
     assert not touching(True, True).any()
     assert touching(False, True).all(axis=0).tolist() == [True, False]

@@ -56,13 +56,13 @@ def impulse_beyond_weight(of_thing):
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("frame_rate", [24, 25, 30, 60, 120])
 def test_a_drop_ends_in_the_papers_force_and_then_in_the_weight(frame_rate, model):
-    found = loads(dropped(frame_rate), model)
+    estimated = loads(dropped(frame_rate), model)
     speed = np.sqrt(2 * GRAVITY * 2.5)
-    force = found.forces.total[:, 2]
+    force = estimated.forces.total[:, 2]
     assert force.max() == pytest.approx(50 * (GRAVITY + speed / MATERIAL.characteristic_time), rel=1e-6)
-    assert impulse_beyond_weight(found) == pytest.approx(50 * speed, rel=1e-6)
+    assert impulse_beyond_weight(estimated) == pytest.approx(50 * speed, rel=1e-6)
     assert force[-1] == pytest.approx(50 * GRAVITY, rel=1e-9)
-    assert (force[~found.contacts.touching[:, 0]] == 0).all()
+    assert (force[~estimated.contacts.touching[:, 0]] == 0).all()
 
 
 def test_a_crater_is_the_same_at_any_frame_rate():
@@ -72,22 +72,24 @@ def test_a_crater_is_the_same_at_any_frame_rate():
 
 def test_flight_is_exactly_without_force_and_a_bounce_keeps_the_momentum():
     for frame_rate in (24, 30, 60, 120):
-        found = loads(dropped(frame_rate, bounce=0.5, seconds=1.6))
+        estimated = loads(dropped(frame_rate, bounce=0.5, seconds=1.6))
         speed = np.sqrt(2 * GRAVITY * 2.5)
-        touching = found.contacts.touching[:, 0]
+        touching = estimated.contacts.touching[:, 0]
         landing = 0.3 + np.sqrt(5 / GRAVITY)
-        airborne = (found.motion.times < landing - 0.05) | (found.motion.times > landing + SHORTEST_CONTACT + 0.05)
+        airborne = (estimated.motion.times < landing - 0.05) | (
+            estimated.motion.times > landing + SHORTEST_CONTACT + 0.05
+        )
         assert not touching[airborne].any()
-        assert (found.forces.total[airborne] == 0).all()
+        assert (estimated.forces.total[airborne] == 0).all()
         # From falling at v to rising at v/2; the weight counts for the moment of contact.
-        assert impulse_beyond_weight(found) == pytest.approx(50 * 1.5 * speed, rel=0.07), frame_rate
+        assert impulse_beyond_weight(estimated) == pytest.approx(50 * 1.5 * speed, rel=0.07), frame_rate
 
 
 @settings(max_examples=10)
 @given(height=st.floats(0.3, 5.0), mass=st.floats(0.1, 1e4), frame_rate=st.sampled_from([24, 30, 60]))
 def test_a_landing_keeps_the_momentum_of_any_fall(height, mass, frame_rate):
-    found = loads(dropped(frame_rate, height=height, mass=mass, seconds=2.5))
-    assert impulse_beyond_weight(found) == pytest.approx(mass * np.sqrt(2 * GRAVITY * height), rel=0.015)
+    estimated = loads(dropped(frame_rate, height=height, mass=mass, seconds=2.5))
+    assert impulse_beyond_weight(estimated) == pytest.approx(mass * np.sqrt(2 * GRAVITY * height), rel=0.015)
 
 
 def test_a_stop_over_several_frames_keeps_the_momentum_too():
@@ -97,39 +99,39 @@ def test_a_stop_over_several_frames_keeps_the_momentum_too():
     # It meets the ground at 2 m/s and is slowed down evenly, sinking into it as it was animated to.
     slowing = np.where(since < stop, speed * since - speed / stop * since**2 / 2, speed * stop / 2)
     z = np.where(since < 0, -speed * since, -slowing)
-    found = loads(thing(np.stack([0 * z, 0 * z, z + RADIUS], -1), frame_rate))
-    assert impulse_beyond_weight(found) == pytest.approx(50 * speed, rel=0.02)
+    estimated = loads(thing(np.stack([0 * z, 0 * z, z + RADIUS], -1), frame_rate))
+    assert impulse_beyond_weight(estimated) == pytest.approx(50 * speed, rel=0.02)
 
 
 def test_a_body_that_rests_from_the_beginning_feels_its_weight_throughout():
-    found = loads(thing(np.tile([0.0, 0.0, RADIUS], (30, 1)), 24))
-    assert found.forces.total == pytest.approx(np.tile([0, 0, 50 * GRAVITY], (len(found.forces.total), 1)))
+    estimated = loads(thing(np.tile([0.0, 0.0, RADIUS], (30, 1)), 24))
+    assert estimated.forces.total == pytest.approx(np.tile([0, 0, 50 * GRAVITY], (len(estimated.forces.total), 1)))
 
 
 @pytest.mark.parametrize("above", [-0.02, 0.02])
 def test_a_ball_that_is_animated_a_little_above_or_in_the_ground_rests_on_it_all_the_same(above):
     time = np.arange(49) / 24
     path = np.stack([time, 0 * time, 0 * time + RADIUS + above], -1)
-    found = loads(thing(path, 24))
-    assert found.contacts.touching.all()
-    assert found.contacts.offset == pytest.approx([above], abs=1e-3)
+    estimated = loads(thing(path, 24))
+    assert estimated.contacts.touching.all()
+    assert estimated.contacts.offset == pytest.approx([above], abs=1e-3)
 
 
 def test_a_thing_that_hovers_or_flies_past_leaves_nothing():
     time = np.arange(49) / 24
-    found = loads(thing(np.stack([time, 0 * time, 0 * time + 1.0], -1), 24))
-    assert not found.contacts.touching.any()
-    assert (found.forces.forces == 0).all()
+    estimated = loads(thing(np.stack([time, 0 * time, 0 * time + 1.0], -1), 24))
+    assert not estimated.contacts.touching.any()
+    assert (estimated.forces.forces == 0).all()
 
 
 def test_a_ball_on_a_slope_is_carried_where_it_touches():
     corners = np.array([[-5.0, -5, -2.5], [5, -5, 2.5], [5, 5, 2.5], [-5, 5, -2.5]])
     slope = MeshTerrain.from_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
     normal = np.array([-0.5, 0, 1]) / np.sqrt(1.25)
-    found = loads(thing(np.tile(RADIUS * normal, (30, 1)), 24), terrain=slope)
-    assert found.contacts.touching.all()
-    assert found.contacts.normal[0, 0] == pytest.approx(normal)
-    assert found.forces.centre_of_pressure[0, 0, 0] == pytest.approx(0.0, abs=0.03)
+    estimated = loads(thing(np.tile(RADIUS * normal, (30, 1)), 24), terrain=slope)
+    assert estimated.contacts.touching.all()
+    assert estimated.contacts.normal[0, 0] == pytest.approx(normal)
+    assert estimated.forces.centre_of_pressure[0, 0, 0] == pytest.approx(0.0, abs=0.03)
 
 
 def test_two_wheels_share_the_weight_by_where_the_mass_is():
@@ -146,9 +148,9 @@ def test_two_wheels_share_the_weight_by_where_the_mass_is():
 
 def test_volume_and_centre_of_closed_bodies():
     vertices, triangles = box(0.2, 0.3, 0.5)
-    found = mass_properties(vertices + np.array([1.0, 2.0, 3.0]), triangles)
-    assert found.volume == pytest.approx(0.03)
-    assert found.centre == pytest.approx([1, 2, 3])
+    properties = mass_properties(vertices + np.array([1.0, 2.0, 3.0]), triangles)
+    assert properties.volume == pytest.approx(0.03)
+    assert properties.centre == pytest.approx([1, 2, 3])
     inside_out = mass_properties(vertices + np.array([1.0, 2.0, 3.0]), triangles[:, ::-1])
     assert (inside_out.volume, *inside_out.centre) == pytest.approx((0.03, 1, 2, 3))
     ball = mass_properties(*sphere(0.5))

@@ -83,8 +83,8 @@ def test_two_feet_share_the_twist_as_they_share_the_load():
 
 def test_mirrored_bodies_twist_the_other_way_and_still_ones_not_at_all():
     angle, _ = swing()
-    one, other = (free_moments(estimated(turning(a, shoulders=0.18, reach=0.28))) for a in (angle, -angle))
-    np.testing.assert_allclose(one, -other, atol=1e-6)
+    first, other = (free_moments(estimated(turning(a, shoulders=0.18, reach=0.28))) for a in (angle, -angle))
+    np.testing.assert_allclose(first, -other, atol=1e-6)
     assert np.abs(free_moments(estimated(turning(0 * angle, shoulders=0.18, reach=0.28)))).max() < 1e-6
 
 

@@ -93,13 +93,13 @@ def in_units(motion, factor):
 @pytest.mark.parametrize("force_model", ["WHOLE_BODY", "IMPULSE"])
 def test_a_file_in_other_units_touches_and_weighs_as_in_metres(factor, gait, force_model):
     motion, _ = motion_and_forces(GAITS[gait], rate=30.0, seconds=4.0)
-    expected, found = (
+    expected, forces = (
         estimate_loads(in_units(motion, size), FlatTerrain(), force_model=force_model, material=SNOW)
         for size in (1.0, factor)
     )
-    assert (found.contacts.touching == expected.contacts.touching).all()
-    assert vertical(found) == pytest.approx(vertical(expected), abs=1e-3)
-    assert found.forces.forces == pytest.approx(expected.forces.forces, rel=1e-3, abs=1e-3 * 77.5 * 9.81)
+    assert (forces.contacts.touching == expected.contacts.touching).all()
+    assert vertical(forces) == pytest.approx(vertical(expected), abs=1e-3)
+    assert forces.forces.forces == pytest.approx(expected.forces.forces, rel=1e-3, abs=1e-3 * 77.5 * 9.81)
 
 
 @given(
@@ -137,11 +137,11 @@ def test_the_impulse_is_the_change_of_momentum_over_any_window(height, period, w
 @pytest.mark.parametrize(("rate", "held"), [(24.0, 1), (24.0, 2), (24.0, 3), (30.0, 2), (30.0, 4)])
 def test_a_walk_on_twos_and_fours_weighs_what_the_body_weighs(rate, held):
     motion, _ = motion_and_forces(GAITS["walk"], rate=rate, seconds=6.0)
-    kept = np.arange(len(motion.frames)) // held * held
+    samples = np.arange(len(motion.frames)) // held * held
     stepped = replace(
         motion,
-        joints={name: path[kept] for name, path in motion.joints.items()},
-        soles=tuple(replace(sole, transforms=sole.transforms[kept]) for sole in motion.soles),
+        joints={name: path[samples] for name, path in motion.joints.items()},
+        soles=tuple(replace(sole, transforms=sole.transforms[samples]) for sole in motion.soles),
     )
     loads = loads_of(stepped)
     assert mean_over_cycles(loads, stride("walk")) == pytest.approx(1.0, abs=0.005)
@@ -164,9 +164,9 @@ def test_a_walk_over_a_foot_that_floats_for_a_step_does_not_fly(rate, float_heig
     motion, forces = motion_and_forces(GAITS["walk"], rate=rate, seconds=4.0)
     first, last = (ends[1] for ends in runs(forces[:, 0, 2] > 0))
     reach = round(0.05 * rate)
-    left = motion.soles[0].transforms.copy()
-    left[first - reach : last + reach, :, 2, 3] += float_height
-    loads = loads_of(replace(motion, soles=(replace(motion.soles[0], transforms=left), motion.soles[1])))
+    poses = motion.soles[0].transforms.copy()
+    poses[first - reach : last + reach, :, 2, 3] += float_height
+    loads = loads_of(replace(motion, soles=(replace(motion.soles[0], transforms=poses), motion.soles[1])))
     step = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
     error = (loads.forces.total[::step] - forces.sum(axis=1))[:, 2] / spring_mass.WEIGHT
     assert np.sqrt((error**2).mean()) < 0.05

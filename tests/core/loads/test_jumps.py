@@ -41,16 +41,16 @@ def test_a_loop_without_offset_presses_as_its_turns_do_each_alone(rate):
     assert len(both.contacts.touching) == len(both.motion.frames) == (2 * count - 1) * steps + 1
     turn, second = slice(0, (count - 1) * steps), slice(count * steps, None)
     assert alone.contacts.touching[-1].any()
-    for here, there in ((turn, turn), (second, slice(None))):
-        np.testing.assert_array_equal(both.contacts.touching[here], alone.contacts.touching[there])
-        np.testing.assert_allclose(both.forces.forces[here], alone.forces.forces[there], atol=1e-6)
+    for here, samples in ((turn, turn), (second, slice(None))):
+        np.testing.assert_array_equal(both.contacts.touching[here], alone.contacts.touching[samples])
+        np.testing.assert_allclose(both.forces.forces[here], alone.forces.forces[samples], atol=1e-6)
     between = slice(turn.stop + (steps > 1), second.start)
     assert not both.contacts.touching[between].any()
     assert not both.forces.forces[between].any()
     np.testing.assert_allclose(both.forces.total, both.forces.forces.sum(axis=1), atol=1e-9)
-    for one, other in zip(both.motion.soles, alone.motion.soles, strict=True):
-        np.testing.assert_allclose(one.transforms[second], other.transforms[:], atol=0.05)
-        np.testing.assert_allclose(one.transforms[second][::steps], other.transforms[::steps], atol=1e-12)
+    for sole, other in zip(both.motion.soles, alone.motion.soles, strict=True):
+        np.testing.assert_allclose(sole.transforms[second], other.transforms[:], atol=0.05)
+        np.testing.assert_allclose(sole.transforms[second][::steps], other.transforms[::steps], atol=1e-12)
 
 
 def test_no_pose_lies_between_two_places():

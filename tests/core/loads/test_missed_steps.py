@@ -31,12 +31,12 @@ def walked(rise=lambda x: 0 * x):
     return replace(motion, soles=tuple(soles))
 
 
-def found(motion, terrain):
+def missed_in(motion, terrain):
     return missed_steps(motion, detect_contacts(motion, terrain))
 
 
 def test_a_walk_on_its_ground_misses_nothing():
-    assert not found(walked(), FlatTerrain())
+    assert not missed_in(walked(), FlatTerrain())
 
 
 def test_steps_beyond_the_edge_of_the_ground_are_counted():
@@ -51,7 +51,7 @@ def test_steps_beyond_the_edge_of_the_ground_are_counted():
 
 def test_steps_of_a_climb_on_level_ground_are_counted():
     motion = walked(lambda x: 0.3 * np.maximum(x - 3.0, 0.0))
-    missed = found(motion, FlatTerrain())
+    missed = missed_in(motion, FlatTerrain())
     assert len(missed) >= 2
     assert max(step.clearance for step in missed) > 0.2
 
@@ -61,9 +61,9 @@ def test_jumps_and_raised_feet_are_no_steps():
     jump = np.maximum(0.0, 3.0 * (time - 1.0) - 4.905 * (time - 1.0) ** 2)
     lifted = np.where((time > 1.0) & (time < 2.5), 0.4, 0.0)
     both = [flat_sole(np.stack([0 * time, 0 * time + y, jump], -1)) for y in (-0.1, 0.1)]
-    one = [flat_sole(np.stack([0 * time, 0 * time + y, z], -1)) for y, z in ((-0.1, lifted), (0.1, 0 * time))]
-    for soles in (both, one):
-        assert not found(character(soles, rate=RATE), FlatTerrain())
+    feet = [flat_sole(np.stack([0 * time, 0 * time + y, z], -1)) for y, z in ((-0.1, lifted), (0.1, 0 * time))]
+    for soles in (both, feet):
+        assert not missed_in(character(soles, rate=RATE), FlatTerrain())
 
 
 @pytest.mark.parametrize(("speed", "steps"), [(0.0, 0), (-2.0, 4)])
@@ -86,7 +86,7 @@ def test_in_a_run_on_the_spot_a_foot_rests_that_moves_with_the_belt_and_none_tha
 
 
 def test_the_advice_names_how_many_since_when_and_what_to_do():
-    missed = found(walked(), Slope(edge=3.0))
+    missed = missed_in(walked(), Slope(edge=3.0))
     text = advice("Walker", missed, "'Field'").text
     assert f"{len(missed)} steps of 'Walker'" in text
     assert "'Field'" in text

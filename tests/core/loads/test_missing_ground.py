@@ -16,8 +16,8 @@ SNOW = GroundMaterial(youngs_modulus=375e3, poisson_ratio=0.05, characteristic_t
 class Part:
     """Level ground where `there` says so."""
 
-    def __init__(self, there):
-        self.there = there
+    def __init__(self, covers):
+        self.there = covers
 
     def heights(self, x, y):
         x, y = np.broadcast_arrays(x, y)
@@ -40,8 +40,8 @@ PARTS = {
 
 @pytest.mark.parametrize("name", PARTS)
 def test_what_is_on_the_ground_bears_as_on_all_of_it_and_the_rest_bears_nothing(name):
-    there, soles = PARTS[name]
-    whole, part = loads_on(FlatTerrain()), loads_on(Part(there))
+    covers, soles = PARTS[name]
+    whole, part = loads_on(FlatTerrain()), loads_on(Part(covers))
     on = part.contacts.touching
     assert on.any()
     if soles:

@@ -19,8 +19,8 @@ def sliding(distance, heading, seconds=1.0, sole=None):
     sole = sole or box_sole(0.3, 0.1)
     count = round(seconds * 120) + 1
     path = np.linspace(0, distance, count)[:, None] * (np.cos(heading), np.sin(heading), 0.0)
-    one = np.ones((count, 1), dtype=bool)
-    loads = loads_of([sole], [pose(path, heading)[:, None]], 100.0 * one, one, 30.0)
+    touching = np.ones((count, 1), dtype=bool)
+    loads = loads_of([sole], [pose(path, heading)[:, None]], 100.0 * touching, touching, 30.0)
     up = np.ones((count, 1, 3))
     skin = LowSkin(loads.motion.frames, up, up[..., 0], 0.3, HEIGHT)
     return replace(loads, motion=replace(loads.motion, skin=skin))

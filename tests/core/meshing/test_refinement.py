@@ -64,11 +64,11 @@ def trail(cell_size, steps=3, origin=(0.0, 0.0)):
 
 
 def all_faces(surface, refinement):
-    kept = [
+    whole = [
         surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]].tolist()
         for face in refinement.kept_faces
     ]
-    return kept + new_faces(refinement)
+    return whole + new_faces(refinement)
 
 
 def new_faces(refinement):
@@ -177,14 +177,14 @@ def doubled(size=5.0):
 def test_quads_are_parallelograms_in_one_triangle_and_turned_like_it(surface):
     refinement = refine(surface, trail(0.03, 2), 0.03)
     place, _ = quads_and_triangles(refinement, positions(surface, refinement)[refinement.corner_vertex])
-    one, other = place[:, 2] - place[:, 0], place[:, 3] - place[:, 1]
+    diagonal, other = place[:, 2] - place[:, 0], place[:, 3] - place[:, 1]
     apart = np.linalg.norm(place[:, [0, 2]].sum(axis=1) - place[:, [1, 3]].sum(axis=1), axis=-1) / 2
-    assert (apart < 0.03 * np.linalg.norm(one, axis=-1)).all(), "the diagonals do not halve each other"
+    assert (apart < 0.03 * np.linalg.norm(diagonal, axis=-1)).all(), "the diagonals do not halve each other"
     first, second, third = np.moveaxis(
         surface.vertices[surface.triangle_vertices[refinement.source[: len(place)]]], 1, 0
     )
     normal = np.cross(second - first, third - first)
-    across = np.cross(one, other)
+    across = np.cross(diagonal, other)
     np.testing.assert_allclose(
         np.einsum("ni,ni->n", across, normal),
         np.linalg.norm(across, axis=-1) * np.linalg.norm(normal, axis=-1),
@@ -213,12 +213,12 @@ def test_corners_lie_in_their_triangle_of_the_surface_at_their_weights(name):
 def test_what_corners_carry_goes_along_with_the_places_of_their_vertices():
     surface = scattered(7)
     refinement = refine(surface, trail(0.02), 0.02)
-    kept = np.flatnonzero(np.isin(np.repeat(np.arange(len(surface.face_start) - 1), 3), refinement.kept_faces))
-    carried = refinement.at_corners(surface, surface.vertices[surface.corner_vertex], kept)
-    vertex = np.concatenate([surface.corner_vertex[kept], refinement.corner_vertex])
+    corners = np.flatnonzero(np.isin(np.repeat(np.arange(len(surface.face_start) - 1), 3), refinement.kept_faces))
+    carried = refinement.at_corners(surface, surface.vertices[surface.corner_vertex], corners)
+    vertex = np.concatenate([surface.corner_vertex[corners], refinement.corner_vertex])
     np.testing.assert_allclose(carried, positions(surface, refinement)[vertex], atol=1e-9)
-    names = refinement.at_corners(surface, surface.corner_vertex, kept)
-    assert set(names[len(kept) :].tolist()) <= set(surface.corner_vertex.tolist()), "whole numbers are not mixed"
+    names = refinement.at_corners(surface, surface.corner_vertex, corners)
+    assert set(names[len(corners) :].tolist()) <= set(surface.corner_vertex.tolist()), "whole numbers are not mixed"
 
 
 def test_vertices_are_about_a_cell_apart_in_the_region_and_few_elsewhere():

@@ -48,8 +48,8 @@ def test_any_stretch_of_steps_is_that_of_the_whole(frames, steps, data):
     poses = tumbling(frames)
     position = np.arange((frames - 1) * steps + 1) / steps
     first = data.draw(st.integers(0, len(position) - 1))
-    some = slice(first, data.draw(st.integers(first, len(position))), data.draw(st.integers(1, 3)))
-    np.testing.assert_array_equal(Between(poses, position, cubic)[some], cubic(poses, position)[some])
+    part = slice(first, data.draw(st.integers(first, len(position))), data.draw(st.integers(1, 3)))
+    np.testing.assert_array_equal(Between(poses, position, cubic)[part], cubic(poses, position)[part])
 
 
 def test_one_calculates_with_it_as_with_an_array():
@@ -80,7 +80,7 @@ def test_a_few_steps_of_a_long_shot_take_little_memory():
 @given(st.integers(0, 3 * STRETCH))
 def test_stretches_make_the_whole(count):
     numbers = np.arange(float(2 * count)).reshape(count, 2)
-    np.testing.assert_array_equal(in_stretches(lambda some: numbers[some] ** 2, count), numbers**2)
+    np.testing.assert_array_equal(in_stretches(lambda part: numbers[part] ** 2, count), numbers**2)
 
 
 def test_the_last_step_alone_is_that_of_the_whole():

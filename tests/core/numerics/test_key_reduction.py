@@ -18,14 +18,14 @@ turns = st.tuples(*[st.floats(-3.1, 3.1)] * 3)
 
 
 @given(curves, curves, st.floats(1e-4, 0.5))
-def test_lines_between_the_kept_samples_stay_within_the_tolerance(one, other, tolerance):
-    count = min(len(one), len(other))
-    values = np.stack([one[:count], other[:count]], axis=1)
-    kept = kept_samples(values, tolerance)
-    assert kept[0] == 0
-    assert kept[-1] == count - 1
+def test_lines_between_the_kept_samples_stay_within_the_tolerance(first, other, tolerance):
+    count = min(len(first), len(other))
+    values = np.stack([first[:count], other[:count]], axis=1)
+    samples = kept_samples(values, tolerance)
+    assert samples[0] == 0
+    assert samples[-1] == count - 1
     for channel in range(2):
-        line = np.interp(np.arange(count), kept, values[kept, channel])
+        line = np.interp(np.arange(count), samples, values[samples, channel])
         assert np.abs(line - values[:, channel]).max() <= tolerance + 1e-12
 
 
@@ -36,8 +36,8 @@ def test_a_straight_line_needs_two_keys_and_a_sine_a_few():
 
 
 @given(turns, turns)
-def test_quaternions_hold_the_rotation(one, other):
-    matrices = Rotation.from_rotvec([one, other]).as_matrix()
+def test_quaternions_hold_the_rotation(first, other):
+    matrices = Rotation.from_rotvec([first, other]).as_matrix()
     quaternion = quaternions(matrices)
     assert rotation_matrices(quaternion) == pytest.approx(matrices, abs=1e-9)
     assert (quaternion[:, 0] >= 0).all()
@@ -57,10 +57,10 @@ def test_euler_angles_hold_the_rotation_and_stay_near(angles, wander, order):
 
 
 @given(turns, turns)
-def test_rotation_vectors_are_those_of_an_independent_implementation(one, other):
-    vectors = np.array([one, other, (0, 0, 0), (1e-9, 0, 0)])
+def test_rotation_vectors_are_those_of_an_independent_implementation(first, other):
+    vectors = np.array([first, other, (0, 0, 0), (1e-9, 0, 0)])
     assert rotation(vectors) == pytest.approx(Rotation.from_rotvec(vectors).as_matrix(), abs=1e-9)
-    start, end = np.array([one]), np.array([other])
+    start, end = np.array([first]), np.array([other])
     if np.linalg.norm(start) > 1e-3 and np.linalg.norm(end) > 1e-3:
         turned = (rotation(turn_between(start, end)) @ (start / np.linalg.norm(start))[..., None])[..., 0]
         assert turned == pytest.approx(end / np.linalg.norm(end), abs=1e-6)

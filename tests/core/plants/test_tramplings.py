@@ -56,10 +56,10 @@ def test_of_what_two_passes_leave_bent_the_shares_multiply():
 
 def test_half_of_the_plants_lie_for_good_after_the_passes_of_their_preset():
     chance, late = (np.arange(1000) + 0.5) / 1000, TREAD.end + 1e6
-    for passes, left in ((150, 0.5), (300, 0.25)):
-        assert cover(passes, 150.0) == pytest.approx(left)
+    for passes, height in ((150, 0.5), (300, 0.25)):
+        assert cover(passes, 150.0) == pytest.approx(height)
         lie = angle(replace(TREAD, passes=float(passes)), GRASS, late, chance) > 45.0
-        assert lie.mean() == pytest.approx(1 - left, abs=2e-3)
+        assert lie.mean() == pytest.approx(1 - height, abs=2e-3)
 
 
 def test_stiff_plants_spring_back_and_what_brushes_them_leaves_less():
@@ -144,12 +144,12 @@ def test_the_ground_under_litter_changes_by_the_volume_of_the_record(steps):
 def test_who_treads_twice_counts_twice_and_bends_more_for_good(steps):
     once, twice = tramplings(steps), tramplings([*steps, *shifted(steps, 400)])
     x, y = places_of(steps[1])
-    one, two = once.latest(x, y), twice.latest(x, y)
-    np.testing.assert_allclose(twice.by.passes[two], 2 * once.by.passes[one])
-    np.testing.assert_allclose(twice.by.lasting[two], 2 * once.by.lasting[one])
-    np.testing.assert_allclose(twice.sink[two], 2 * once.sink[one], atol=1e-9)
+    single, two = once.latest(x, y), twice.latest(x, y)
+    np.testing.assert_allclose(twice.by.passes[two], 2 * once.by.passes[single])
+    np.testing.assert_allclose(twice.by.lasting[two], 2 * once.by.lasting[single])
+    np.testing.assert_allclose(twice.sink[two], 2 * once.sink[single], atol=1e-9)
     before = twice.latest(x, y, 300.0)
-    np.testing.assert_allclose(twice.by.start[before], once.by.start[one])
+    np.testing.assert_allclose(twice.by.start[before], once.by.start[single])
 
 
 def test_passes_of_a_cell_follow_each_other_in_time(steps):
@@ -171,11 +171,11 @@ def test_blades_lean_where_the_foot_travels_and_outward_beside_it(steps):
 
 
 def test_legs_part_tall_grass_to_both_sides_of_their_way_and_leave_short_grass(steps):
-    one, after = (step for step in steps if step.sole == steps[0].sole)
-    ahead = after.position[:2] - one.position[:2]
+    first, after = (step for step in steps if step.sole == steps[0].sole)
+    ahead = after.position[:2] - first.position[:2]
     ahead /= np.linalg.norm(ahead)
-    aside, middle = np.array((-ahead[1], ahead[0])), (one.position[:2] + after.position[:2]) / 2
-    table = tramplings([one, after])
+    aside, middle = np.array((-ahead[1], ahead[0])), (first.position[:2] + after.position[:2]) / 2
+    table = tramplings([first, after])
     tall, short = Plant(1.5, 0.5, 20.0, 0.4, 100.0), replace(GRASS, height=SWING_HEIGHT)
     for side in (-1.0, 1.0):
         for away in (0.08, 0.11):

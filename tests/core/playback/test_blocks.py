@@ -28,28 +28,28 @@ def footprint():
     [(-5, -7, 400, 300), (0, 0, 64, 64), (60, 62, 9, 5), (63, 0, 1, 40), (17, -30, 50, 60), (-90, -90, 100, 100)],
 )
 def test_what_changes_within_a_window_is_what_the_record_says_at_each_frame(footprint, column, row, columns, rows):
-    own = footprint.window
-    window = Window(own.column + column, own.row + row, columns, rows)
+    extent = footprint.window
+    window = Window(extent.column + column, extent.row + row, columns, rows)
     frames, changes = ChangesInBlocks(footprint).within(window)
     assert np.diff(frames) == pytest.approx(footprint.frame_step)
     top, left = max(row, 0), max(column, 0)
-    seen = slice(top, min(row + rows, own.rows)), slice(left, min(column + columns, own.columns))
+    seen = slice(top, min(row + rows, extent.rows)), slice(left, min(column + columns, extent.columns))
     grown = np.zeros((2, rows, columns))
     for frame, change in zip(frames, changes, strict=True):
         grown += change
         expected = np.zeros_like(grown)
         for channel, of_channel in enumerate((footprint.compression, footprint.rim)):
-            there = footprint.tile(of_channel, frame)[seen]
+            tile = footprint.tile(of_channel, frame)[seen]
             down, right = top - row, left - column
-            expected[channel, down : down + there.shape[0], right : right + there.shape[1]] = there
+            expected[channel, down : down + tile.shape[0], right : right + tile.shape[1]] = tile
         assert np.array_equal(grown, expected)
     assert grown.any()
 
 
 @pytest.mark.parametrize("place", [(-50, 0), (0, 5000), (5000, 0), (0, -50)])
 def test_beside_a_footprint_nothing_changes(footprint, place):
-    own = footprint.window
-    frames, changes = ChangesInBlocks(footprint).within(Window(own.column + place[0], own.row + place[1], 50, 50))
+    window = footprint.window
+    frames, changes = ChangesInBlocks(footprint).within(Window(window.column + place[0], window.row + place[1], 50, 50))
     assert not len(frames)
     assert changes.shape == (0, 2, 50, 50)
 

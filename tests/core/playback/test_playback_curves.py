@@ -117,8 +117,8 @@ def test_nothing_makes_no_polylines():
 
 
 def at(footprints, x, y, time_stretch=1.0):
-    found = playback_curves_at(footprints, x, y, blur_sigma=0.005, frame_rate=RATE, time_stretch=time_stretch)
-    return unpacked(*found)
+    curves = playback_curves_at(footprints, x, y, blur_sigma=0.005, frame_rate=RATE, time_stretch=time_stretch)
+    return unpacked(*curves)
 
 
 def test_made_part_by_part_they_are_the_same(monkeypatch):
@@ -171,8 +171,8 @@ def test_ground_that_is_stepped_on_again_and_again_takes_less_memory_than_what_i
             tracemalloc.stop()
         return lines.position.unpacked().nbytes + lines.contact.unpacked().nbytes, peak
 
-    (few, before), (many, after) = played_and_peak(6), played_and_peak(12)
-    assert after - before < 0.5 * (many - few)
+    (few, before), (more, after) = played_and_peak(6), played_and_peak(12)
+    assert after - before < 0.5 * (more - few)
 
 
 def test_what_is_small_is_not_packed_and_plays_the_same(monkeypatch):

@@ -123,7 +123,7 @@ def test_the_values_of_a_point_bend_together_each_within_its_own_tolerance():
     assert (error <= tolerance).all()
     assert (error <= result.error + 1e-12).all()
     alone = [core_ramps.fit(np.arange(90.0), values[..., [k]], tolerance[[k]]) for k in (0, 1)]
-    assert len(result.ramps.point) < sum(len(one.ramps.point) for one in alone)
+    assert len(result.ramps.point) < sum(len(each.ramps.point) for each in alone)
 
 
 def test_a_short_pause_within_a_step_takes_no_ramp_and_a_long_one_is_kept():

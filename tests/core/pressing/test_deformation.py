@@ -87,7 +87,7 @@ def test_dilation_reaches_every_cell_within_its_reach_and_no_other(coverage, rea
     radius = max(reach + 1e-6, 1.0)
     y, x = np.mgrid[-6:7, -6:7]
     disc = x**2 + y**2 <= radius**2
-    expected = np.array([ndimage.binary_dilation(one, disc) for one in mask])
+    expected = np.array([ndimage.binary_dilation(each, disc) for each in mask])
     assert np.array_equal(dilate(mask, reach), expected)
 
 

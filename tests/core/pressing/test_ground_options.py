@@ -190,10 +190,10 @@ def test_twenty_steps_on_one_spot_come_to_rest_above_the_depth_of_a_lasting_load
 
 
 @given(st.floats(0, 0.1), st.floats(0, 0.1), st.floats(0.01, 3), st.floats(0, 100))
-def test_hardened_ground_gives_less_never_back_and_never_beyond_the_target(found, more, rate, hardening):
-    before = np.array([found + more * 0.1])
+def test_hardened_ground_gives_less_never_back_and_never_beyond_the_target(compacted, more, rate, hardening):
+    before = np.array([compacted + more * 0.1])
     plain = compress(before, np.ones(1), 0.05, rate)
-    hard = compress(before, np.ones(1), 0.05, rate, compacted=np.array([found]), hardening=hardening)
+    hard = compress(before, np.ones(1), 0.05, rate, compacted=np.array([compacted]), hardening=hardening)
     assert before <= hard <= plain + 1e-15
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.composers.simulation import simulate
-from softground_addon.core.ground import deep_ground, presets
-from softground_addon.core.ground.deep_ground import wading
+from softground_addon.core.ground import presets
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
@@ -15,6 +14,8 @@ from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.pressing import contact_layout
 from softground_addon.core.pressing.deformation import compression_rate
 from softground_addon.core.pressing.plate import FALL_TIME, STIFF, Plate
+from softground_addon.core.soles import deep_ground
+from softground_addon.core.soles.deep_ground import wading
 from tests.core.ground.test_variation import Bands
 from tests.core.walkers import FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk
 

@@ -237,18 +237,18 @@ def test_without_load_no_bit_changes():
 def test_what_is_left_of_a_foot_bears_the_force_wherever_it_acts(start):
     x, y, area = points_of("foot")
     area = area * (x > 3.0 + start)
-    left = area[0] > 0
-    middle = np.array([x[0, left].mean(), y[0, left].mean()])
+    touching = area[0] > 0
+    middle = np.array([x[0, touching].mean(), y[0, touching].mean()])
     centre = middle + np.array([(u, v) for u in np.linspace(-0.08, 0.08, 41) for v in (0.0, 0.004)])
     count = len(centre)
-    many = [np.repeat(values, count, axis=0) for values in (x, y, area)]
-    field = pressure_field(*many, centre, 1e-6)
-    pressure = field.at(*many[:2])
-    share = many[2] / many[2].sum(axis=1, keepdims=True)
+    repeated = [np.repeat(values, count, axis=0) for values in (x, y, area)]
+    field = pressure_field(*repeated, centre, 1e-6)
+    pressure = field.at(*repeated[:2])
+    share = repeated[2] / repeated[2].sum(axis=1, keepdims=True)
     assert (pressure * share).sum(axis=1) == pytest.approx(np.ones(count), abs=1e-3)
     # Toward the middle the force acts where it was asked to; beyond the kern as far out as it may.
-    reached = np.stack([(pressure * share * places).sum(axis=1) for places in many[:2]], axis=-1) - middle
+    reached = np.stack([(pressure * share * places).sum(axis=1) for places in repeated[:2]], axis=-1) - middle
     asked = centre - middle
-    near = np.abs(asked[:, 0]) < 0.3 * x[0, left].std()
+    near = np.abs(asked[:, 0]) < 0.3 * x[0, touching].std()
     assert reached[near] == pytest.approx(asked[near], abs=5e-4)
     assert (np.diff(reached[::2, 0]) > -5e-4).all()

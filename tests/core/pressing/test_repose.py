@@ -116,23 +116,23 @@ def test_ground_that_is_none_neither_takes_nor_gives():
     st.integers(0, 7),
     st.sampled_from([1, 4, SWEEPS_TO_REST]),
 )
-def test_what_lies_still_around_it_does_not_change_how_ground_slides_by_a_bit(seed, above, left, sweeps):
+def test_what_lies_still_around_it_does_not_change_how_ground_slides_by_a_bit(seed, above, columns, sweeps):
     """The same cells pair up wherever a window starts, and only the box around what is too steep is swept."""
     chance = np.random.default_rng(seed)
     heap = np.zeros((61, 58))
     row, column = chance.integers(24, 32, 2)
     heap[row : row + 3, column : column + 4] = chance.uniform(-0.04, 0.06, (3, 4))
-    wide = np.pad(heap, ((above, 9), (left, 3)))
+    wide = np.pad(heap, ((above, 9), (columns, 3)))
     corner = (10, -7)
     options = {"angle": ANGLE, "cell_size": 0.01, "sweeps": sweeps}
     here = slid(heap, 0 * heap, 0 * heap, fixed=np.zeros(heap.shape, bool), corner=corner, **options)
-    there = slid(
+    inner = slid(
         wide,
         0 * wide,
         0 * wide,
         fixed=np.zeros(wide.shape, bool),
-        corner=(corner[0] - above, corner[1] - left),
+        corner=(corner[0] - above, corner[1] - columns),
         **options,
     )
-    assert (there[above : above + 61, left : left + 58] == here).all()
+    assert (inner[above : above + 61, columns : columns + 58] == here).all()
     assert (here != heap).any()

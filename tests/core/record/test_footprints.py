@@ -64,8 +64,8 @@ def test_the_ground_recomposed_at_random_frames_in_random_order_is_the_simulatio
 def test_the_order_of_the_footprints_changes_no_bit(bake):
     _, footprints = bake
     for frame in (20.0, 33.3, 200.0):
-        one, other = recompose(footprints, frame), recompose(footprints[::-1], frame)
-        assert np.array_equal(one.read(EVERYWHERE), other.read(EVERYWHERE))
+        first, other = recompose(footprints, frame), recompose(footprints[::-1], frame)
+        assert np.array_equal(first.read(EVERYWHERE), other.read(EVERYWHERE))
 
 
 def test_between_frames_the_ground_moves_in_a_straight_line(bake):
@@ -123,9 +123,9 @@ def test_contact_lasts_after_the_ground_has_stopped_giving_way():
     assert last_contact([footprint], 60.0, 0.01).nearest(np.zeros(1), np.zeros(1))[0] == 60.0
 
 
-def same(one, other):
-    for field in fields(one):
-        a, b = getattr(one, field.name), getattr(other, field.name)
+def same(first, other):
+    for field in fields(first):
+        a, b = getattr(first, field.name), getattr(other, field.name)
         if is_dataclass(a):
             same(a, b)
         elif isinstance(a, np.ndarray):
@@ -238,7 +238,7 @@ def test_a_record_with_one_impossible_number_is_refused(bake, key, value):
     + [("start_frame", -1e9), ("end_frame", 1e9), ("area_m2", -1.0), ("peak_force_n", 1e300)],
 )
 def test_a_record_whose_numbers_are_far_from_what_they_can_be_is_refused(bake, name, value):
-    names, soles, arrays = to_arrays([replace(one, **{name: value}) for one in bake[1][:4]])
+    names, soles, arrays = to_arrays([replace(each, **{name: value}) for each in bake[1][:4]])
     with pytest.raises(InputError, match=rf"{name} is .*bake again"):
         from_arrays(names, soles, arrays)
 

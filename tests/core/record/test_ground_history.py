@@ -53,5 +53,5 @@ def test_how_many_footprints_are_kept_laid_out_changes_nothing(footprints, monke
     rng = np.random.default_rng(2)
     x, y, frame = rng.uniform(-0.3, 2.5, 500), rng.uniform(-0.3, 0.3, 500), rng.uniform(0, 60, 500)
     of_all = GroundHistory(FlatTerrain(), footprints).change(x, y, frame)
-    monkeypatch.setattr(ground_history, "KEPT", 1)
+    monkeypatch.setattr(ground_history, "PRINTS_REMEMBERED", 1)
     np.testing.assert_array_equal(GroundHistory(FlatTerrain(), footprints).change(x, y, frame), of_all)

@@ -84,9 +84,9 @@ def test_a_record_with_forged_edits_is_refused(edits):
 
 
 def test_the_ground_is_made_without_a_muted_step(footprints):
-    left = BakeRecord(footprints, {}, {step_id(footprints[1]): StepEdit(mute=True)})
-    assert list(map(step_id, left.edited)) == list(map(step_id, [footprints[0], *footprints[2:]]))
-    before, after, muted = (recompose(prints).volumes() for prints in (footprints, left.edited, footprints[1:2]))
+    edited = BakeRecord(footprints, {}, {step_id(footprints[1]): StepEdit(mute=True)})
+    assert list(map(step_id, edited.edited)) == list(map(step_id, [footprints[0], *footprints[2:]]))
+    before, after, muted = (recompose(prints).volumes() for prints in (footprints, edited.edited, footprints[1:2]))
     np.testing.assert_allclose(after, np.subtract(before, muted), rtol=1e-9)
 
 
@@ -131,7 +131,10 @@ def test_copies_have_ids_and_numbers_of_their_own(footprints):
     assert new_copy(edits, footprints[1]) == step_id(footprints[1], 2)
     assert new_copy(edits, footprints[0]) == step_id(footprints[0], 1)
     assert edits_by_number(footprints, {step_id(footprints[1], 2): StepEdit()}) == {1 + 2 * count: StepEdit()}
-    assert edits_by_number([moved(one, 3.0) for one in footprints], edits).keys() == {1 + count, 1 + 3 * count}
+    assert edits_by_number([moved(footprint, 3.0) for footprint in footprints], edits).keys() == {
+        1 + count,
+        1 + 3 * count,
+    }
     assert without_step(footprints[:1], edits) == list(edits)
 
 
@@ -188,14 +191,14 @@ def test_what_lasts_long_or_happens_late_throws_as_it_did(footprints):
     """A crate that is dragged for minutes, in the last frames that Blender has."""
     samples = np.random.default_rng(1).random((30_000, 4 + 6 * 2)).astype(np.float32)
     stored = record.dump(BakeRecord(footprints, {}, throws=[thrown(samples, first=1_048_000.0)]))
-    (one,) = record.load(stored).throws
-    assert one.first == 1_048_000.0
-    assert (one.samples == samples).all()
+    (throw,) = record.load(stored).throws
+    assert throw.first == 1_048_000.0
+    assert (throw.samples == samples).all()
 
 
 def test_throws_that_unpack_to_far_more_than_a_record_has_take_no_memory(footprints):
-    many = [to_json_of_throw(thrown(np.zeros((10_000, 604), np.float32)))] * 500
-    forged = with_text(record.dump(BakeRecord(footprints, {})), throws=many)
+    throws = [to_json_of_throw(thrown(np.zeros((10_000, 604), np.float32)))] * 500
+    forged = with_text(record.dump(BakeRecord(footprints, {})), throws=throws)
     tracemalloc.start()
     try:
         with pytest.raises(InputError, match="clear the bake"):

@@ -11,9 +11,9 @@ def test_fissures_run_straight_out_of_a_round_print_as_deep_as_asked_and_no_furt
     angle, out = np.meshgrid(np.linspace(0, 2 * np.pi, 2000), np.linspace(-0.02, 0.06, 81), indexing="ij")
     x, y = ((RADIUS + out) * part(angle) for part in (np.cos, np.sin))
     rim = [RADIUS * part(angle) for part in (np.cos, np.sin)]
-    flat = [one.ravel() for one in (x, y, *rim, -out, (out < 0).astype(float))]
+    flat = [each.ravel() for each in (x, y, *rim, -out, (out < 0).astype(float))]
     seen = (Fissures(30.0, 38.0, 1.6, 8.0, patches=1e4).heights(Around(seed, *flat, 0.0005, 1.0)) for seed in range(99))
-    heights = next(one for one in seen if one.min() < -0.004).reshape(angle.shape)  # it is in one patch, or in none
+    heights = next(each for each in seen if each.min() < -0.004).reshape(angle.shape)  # it is in one patch, or in none
     assert heights.max() <= 0
     assert not heights[out < 0].any()
     assert not heights[out > 0.038].any()

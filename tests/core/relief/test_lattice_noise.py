@@ -44,8 +44,8 @@ def test_it_has_no_steps_and_no_bends():
 def test_it_depends_on_place_and_seed_alone():
     x, y = field(50)
     whole = noise(9, SIZE, x, y)
-    some = np.arange(0, len(x), 7)
-    assert np.array_equal(whole[some], noise(9, SIZE, x[some], y[some]))
+    sample = np.arange(0, len(x), 7)
+    assert np.array_equal(whole[sample], noise(9, SIZE, x[sample], y[sample]))
     assert abs(np.corrcoef(whole, noise(10, SIZE, x, y))[0, 1]) < 0.2
 
 
@@ -55,11 +55,11 @@ def test_hashes_are_the_same_bytes_on_every_machine():
 
 def test_cells_are_voronoi_cells_of_their_size():
     x, y = field(200)
-    found = cells(4, SIZE, x, y)
-    area = 0.005**2 * len(x) / len(np.unique(found.number))
+    near = cells(4, SIZE, x, y)
+    area = 0.005**2 * len(x) / len(np.unique(near.number))
     assert area == pytest.approx(SIZE**2, rel=0.15)
-    assert found.to_edge.min() >= 0
-    centres = np.stack([x - found.x, y - found.y])
-    for number in np.unique(found.number)[:20]:
-        of_cell = centres[:, found.number == number]
+    assert near.to_edge.min() >= 0
+    centres = np.stack([x - near.x, y - near.y])
+    for number in np.unique(near.number)[:20]:
+        of_cell = centres[:, near.number == number]
         assert np.ptp(of_cell, axis=1).max() < 1e-9

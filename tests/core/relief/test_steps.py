@@ -60,13 +60,13 @@ def test_volumes_stay_within_a_percent_and_heights_change(look, pattern):
     footprints = steps_on(look)
     place = around(footprints)
     treads = {(step.character, step.sole): SoleTread(pattern) for step in footprints}
-    found = relief(look, footprints, place, treads=treads)
+    reliefs = relief(look, footprints, place, treads=treads)
     sample = sample_at(footprints, *place, **SHOWN, blur_sigma=MATERIALS[look].blur_sigma)
-    for step in found:
+    for step in reliefs:
         pressed_there = sample.compression[step.point].sum()
         assert abs(step.change[:, 0].sum()) < 0.01 * pressed_there
         assert step.tread
-    height = all_together(found, place.shape[1])[:, 0]
+    height = all_together(reliefs, place.shape[1])[:, 0]
     assert np.abs(height).max() > 0.003
 
 
@@ -75,19 +75,19 @@ def test_the_same_places_give_the_same_bytes_in_any_company():
     place = around(footprints)
     whole = all_together(relief("soil", footprints, place), place.shape[1])
     again = all_together(relief("soil", footprints, place), place.shape[1])
-    some = np.arange(place.shape[1] // 2)  # the lower half
-    alone = all_together(relief("soil", footprints, place[:, some]), len(some))
+    lower = np.arange(place.shape[1] // 2)  # the lower half
+    alone = all_together(relief("soil", footprints, place[:, lower]), len(lower))
     assert np.array_equal(whole, again)
-    assert np.array_equal(whole[some], alone)
+    assert np.array_equal(whole[lower], alone)
 
 
 def test_no_two_prints_are_alike_where_all_but_the_step_is_the_same():
     step = steps_on("snow")[0]
     later = replace(step, start_frame=step.start_frame + 100, end_frame=step.end_frame + 100)
     place = around([step])
-    one, other = (all_together(relief("snow", [each], place), place.shape[1])[:, 0] for each in (step, later))
-    moved = (one != 0) & (other != 0)
-    assert np.std(one[moved] - other[moved]) > 0.5 * np.std(one[moved])
+    first, other = (all_together(relief("snow", [each], place), place.shape[1])[:, 0] for each in (step, later))
+    moved = (first != 0) & (other != 0)
+    assert np.std(first[moved] - other[moved]) > 0.5 * np.std(first[moved])
 
 
 def test_a_later_step_in_the_same_place_leaves_its_own_relief_alone_under_it():
@@ -105,16 +105,16 @@ def test_a_later_step_in_the_same_place_leaves_its_own_relief_alone_under_it():
 def test_relief_grows_with_the_ramps_of_its_step_and_never_back():
     footprints = steps_on("wet_sand")[:1]
     place = around(footprints, 0.004)
-    found = relief("wet_sand", footprints, place)
+    of_steps = relief("wet_sand", footprints, place)
     sigma = MATERIALS["wet_sand"].blur_sigma
     plain = vertex_histories(footprints, *place, blur_sigma=sigma).movement
-    with_it = vertex_histories(footprints, *place, blur_sigma=sigma, relief=found).movement
+    with_it = vertex_histories(footprints, *place, blur_sigma=sigma, relief=of_steps).movement
     count = place.shape[1]
     frames = np.arange(footprints[0].start_frame - 3, footprints[0].end_frame + 3)
     heights, reliefs = np.stack([[a.at(f, count)[:, 0] for f in frames] for a in (plain, with_it)])
     grown = np.abs(reliefs - heights)
     assert (np.diff(grown, axis=0) > -4 * QUANTUM).all()
-    assert np.abs((reliefs - heights)[-1] - all_together(found, count)[:, 0]).max() <= 4 * QUANTUM
+    assert np.abs((reliefs - heights)[-1] - all_together(of_steps, count)[:, 0]).max() <= 4 * QUANTUM
     ramped = np.isin(np.arange(count), plain.point)
     still = (np.diff(heights, axis=0) == 0) & (np.diff(plain_compression(plain, frames, count), axis=0) == 0)
     assert (np.abs(np.diff(reliefs, axis=0))[still & ramped] <= QUANTUM).all()
@@ -141,9 +141,9 @@ def test_lengths_are_those_of_the_ground_and_not_of_the_foot_down_to_small_feet(
     shrunk = small.tile(small.compression).max()
     assert shrunk == pytest.approx(step.max_depth_m)  # cells shrink, depths do not: a deep narrow hole
     place = around([small], SPACING / 10, 0.026)
-    found = relief("snow", [small], place)
-    assert found[0].change[:, 0].std() < 1.2 * step.max_depth_m
-    assert np.isfinite(found[0].change).all()
+    reliefs = relief("snow", [small], place)
+    assert reliefs[0].change[:, 0].std() < 1.2 * step.max_depth_m
+    assert np.isfinite(reliefs[0].change).all()
 
 
 def test_tables_name_what_is_wrong():
@@ -188,10 +188,10 @@ def test_soles_show_on_the_floor_on_each_of_the_grounds_that_two_clicks_give(nam
 def test_water_lies_level_in_mud_and_a_later_step_takes_it_along():
     step = steps_on("mud")[0]
     place = around([step])
-    found = relief("mud", [step], place)
-    water = water_at(found, place.shape[1])
+    reliefs = relief("mud", [step], place)
+    water = water_at(reliefs, place.shape[1])
     sample = sample_at([step], *place, **SHOWN, blur_sigma=MATERIALS["mud"].blur_sigma)
-    surface = (sample.display + all_together(found, place.shape[1])[:, 0] + water)[water > 0]
+    surface = (sample.display + all_together(reliefs, place.shape[1])[:, 0] + water)[water > 0]
     assert water.max() > 0.004
     assert np.ptp(surface) <= 4 * QUANTUM
     assert water_at(relief("soil", [step], place), place.shape[1]) is None

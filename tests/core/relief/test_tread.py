@@ -100,8 +100,8 @@ def test_a_bare_foot_is_on_its_heel_ball_and_five_toes_and_not_on_its_arch():
 
 def test_ground_stands_between_toes():
     toes = _PADS[-5:, :2]
-    for one, other in pairwise(toes):
-        line = one + (other - one) * np.linspace(0.0, 1.0, 101)[:, None]
+    for toe, other in pairwise(toes):
+        line = toe + (other - toe) * np.linspace(0.0, 1.0, 101)[:, None]
         stands = bare(under(line[:, 0] * LENGTH, line[:, 1] * 0.1))
         assert max(stands[0], stands[-1]) < 0.1
         assert stands.max() > 0.4

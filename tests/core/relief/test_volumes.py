@@ -64,7 +64,9 @@ def test_each_print_keeps_its_volume_to_a_percent(look, kind, spacing):
         )
         place = np.stack(np.meshgrid(x, y)).reshape(2, -1)
         treads = {(step.character, step.sole): SoleTread(TREADS[kind])} if kind in TREADS else {}
-        (found,) = relief_of_steps([step], *place, ReliefSettings(amounts.of_look(look), 1.0, treads), blur_sigma=blur)
+        (of_step,) = relief_of_steps(
+            [step], *place, ReliefSettings(amounts.of_look(look), 1.0, treads), blur_sigma=blur
+        )
         shown = sample_at([step], *place, frame=1e4, frame_rate=30.0, cell_size=step.cell_size, blur_sigma=blur)
-        assert abs(found.change[:, 0].sum()) < 0.01 * shown.compression.sum()
-        assert np.abs(found.change[:, 0]).max() > 0.0005
+        assert abs(of_step.change[:, 0].sum()) < 0.01 * shown.compression.sum()
+        assert np.abs(of_step.change[:, 0]).max() > 0.0005

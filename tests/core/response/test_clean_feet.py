@@ -86,10 +86,10 @@ def floating(motion, touching):
 
 def test_toes_rest_until_they_swing_although_they_float_and_are_held_there():
     motion, touching = walk(stride=1.4)
-    risen, left = floating(motion, touching)
-    rests = resting(risen, left, FLOOR)
-    assert rests[left].all()
-    assert (rests != touching).sum() < (rests & ~left).sum() / 4, "but for what swings slowly yet"
+    risen, remaining = floating(motion, touching)
+    rests = resting(risen, remaining, FLOOR)
+    assert rests[remaining].all()
+    assert (rests != touching).sum() < (rests & ~remaining).sum() / 4, "but for what swings slowly yet"
     np.testing.assert_array_equal(rests[:, 1], touching[:, 1])
     skates = moved(risen, 0.2 * (motion.hips - motion.hips[0]) * (1, 0, 0))
     after = responding(skates, clean(skates, rests, FLOOR))
@@ -100,5 +100,5 @@ def test_toes_rest_until_they_swing_although_they_float_and_are_held_there():
 
 def test_feet_that_step_on_the_spot_do_not_rest_in_the_air():
     motion, touching = walk(stride=0.0)
-    risen, left = floating(motion, touching)
-    np.testing.assert_array_equal(resting(risen, left, FLOOR), left)
+    risen, remaining = floating(motion, touching)
+    np.testing.assert_array_equal(resting(risen, remaining, FLOOR), remaining)

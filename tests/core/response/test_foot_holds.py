@@ -85,7 +85,7 @@ def test_a_foot_that_is_held_as_a_whole_does_not_move(sliding):
     places, pose = held(sliding, "FULL")
     assert np.abs(places - places[0]).max() < 1e-6
     source = sliding[0].soles[0].transforms[during, 0]
-    turned = [np.abs(rotation_vectors((one[:3, :3].T @ pose[0, :3, :3])[None])).max() for one in source]
+    turned = [np.abs(rotation_vectors((each[:3, :3].T @ pose[0, :3, :3])[None])).max() for each in source]
     assert min(turned) < np.radians(3.0), "it is held as it was in one of its frames, but for the lock's turn"
 
 
@@ -130,7 +130,7 @@ def lunging(sliding):
     at = second_contact(motion, touching).start + 5
     part = np.clip((np.arange(len(motion.frames)) - at) / 6.0, 0.0, 1.0)
     way = (part * part * (3 - 2 * part))[:, None] * (0.0, 0.3, 0.0)
-    joints = motion.joints | {f"{one}_l": motion.joints[f"{one}_l"] + way for one in ("ankle", "ball")}
+    joints = motion.joints | {f"{each}_l": motion.joints[f"{each}_l"] + way for each in ("ankle", "ball")}
     left, right = motion.soles
     return replace(motion, soles=(along(left, way), right), joints=joints), touching
 
@@ -204,9 +204,9 @@ def test_easing_that_is_longer_than_the_contact_holds_one_frame():
 def test_holds_that_hold_nothing_are_told(sliding):
     motion, touching = sliding
     swings = float(motion.frames[np.flatnonzero(~touching[:, 0])[0]])
-    there = FootHold("foot.L", motion.frames[second_contact(*sliding)][2])
+    hold = FootHold("foot.L", motion.frames[second_contact(*sliding)][2])
     nowhere = (FootHold("foot.L", swings), FootHold("paw", 3.0), FootHold("foot.L", 1e6))
-    assert set(missed_holds(motion, touching, (there, *nowhere))) == set(nowhere)
+    assert set(missed_holds(motion, touching, (hold, *nowhere))) == set(nowhere)
     np.testing.assert_array_equal(cleaned(sliding, *nowhere).soles[0].transforms, cleaned(sliding).soles[0].transforms)
 
 

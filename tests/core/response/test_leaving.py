@@ -65,9 +65,9 @@ def test_a_walk_that_sinks_too_deep_to_wade_is_named_with_a_remedy(legs, codes):
     motion, touching = walk()
     floor = GroundHistory(FlatTerrain(0.0))
     response = respond(motion, touching, floor, tilt=None, grounding=GroundingOptions())
-    left = gaps(motion, touching, floor)
+    remaining = gaps(motion, touching, floor)
     depth = legs * DEEP_FOR_A_WALK * LEG
-    findings = response_findings([CharacterResponse(motion, response, left, left, depth)])
+    findings = response_findings([CharacterResponse(motion, response, remaining, remaining, depth)])
     assert [finding.code for finding in findings] == codes
     for finding in findings:
         assert f"'{motion.name}' sinks {100 * depth:.0f} cm" in finding.message

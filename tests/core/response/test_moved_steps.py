@@ -38,10 +38,10 @@ def followed_by(edit, name="foot.L"):
     motion, touching = walk()
     prints = prints_of(motion, touching)
     step = second_of(prints, name)
-    found = follow(motion, touching, prints, {step_id(step): edit})
+    followed = follow(motion, touching, prints, {step_id(step): edit})
     plain = respond(motion, touching, GroundHistory(FLOOR), tilt=None, grounding=GroundingOptions())
-    answer = respond(motion, touching, GroundHistory(FLOOR), tilt=None, grounding=GroundingOptions(), followed=found)
-    return responding(motion, plain), responding(motion, answer), step, found
+    answer = respond(motion, touching, GroundHistory(FLOOR), tilt=None, grounding=GroundingOptions(), followed=followed)
+    return responding(motion, plain), responding(motion, answer), step, followed
 
 
 def contact(motion, step):
@@ -61,7 +61,7 @@ def test_nobody_follows_a_copy():
 
 @pytest.mark.parametrize("foot", ["foot.L", "foot.R"])
 def test_the_foot_stands_where_its_step_was_moved_and_turned_to(foot):
-    plain, moved, step, found = followed_by(StepEdit(move_m=MOVE, turn_deg=TURN), foot)
+    plain, moved, step, followed = followed_by(StepEdit(move_m=MOVE, turn_deg=TURN), foot)
     cosine, sine = np.cos(np.radians(TURN)), np.sin(np.radians(TURN))
     from_pivot = (sole_points(plain, foot) - step.position)[..., :2]
     wanted = from_pivot @ np.array([[cosine, sine], [-sine, cosine]]) + step.position[:2] + MOVE
@@ -69,7 +69,7 @@ def test_the_foot_stands_where_its_step_was_moved_and_turned_to(foot):
     now = sole_points(moved, foot)
     np.testing.assert_allclose(now[stands][..., :2], wanted[stands], atol=1e-3)
     np.testing.assert_allclose(now[stands][..., 2], sole_points(plain, foot)[stands][..., 2], atol=1e-3)
-    assert found.out_of_reach == ()
+    assert followed.out_of_reach == ()
 
 
 def test_all_other_contacts_stay_where_they_are():
@@ -112,8 +112,8 @@ def test_the_leg_keeps_its_lengths():
 
 def test_a_step_beyond_the_leg_is_followed_as_far_as_it_goes_and_named():
     far = (0.0, 1.5)
-    plain, moved, step, found = followed_by(StepEdit(move_m=far))
-    (short,) = found.out_of_reach
+    plain, moved, step, followed = followed_by(StepEdit(move_m=far))
+    (short,) = followed.out_of_reach
     assert short.step == step_id(step)
     assert 0.1 < short.part < 0.7
     stands = contact(plain, step)

@@ -57,8 +57,8 @@ def test_where_no_two_frames_agree_as_in_a_turn_on_the_spot_the_nearest_to_the_m
     still = replace(still, frames=np.arange(3.0) + 1, joints={})
     speeds = np.array([0.5, 3.0])
     still.soles[0].transforms[:, :, 0, 3] -= np.concatenate([[0.0], np.cumsum(speeds * still.time_step)])[:, None]
-    found = travel_velocity(still, np.ones((3, 1), bool), FlatTerrain())
-    np.testing.assert_allclose(found, (1.75, 0.0), atol=1e-6)
+    velocity = travel_velocity(still, np.ones((3, 1), bool), FlatTerrain())
+    np.testing.assert_allclose(velocity, (1.75, 0.0), atol=1e-6)
 
 
 def test_what_never_touches_has_no_travel():
@@ -74,5 +74,5 @@ def test_contacts_that_last_a_single_scene_frame_have_the_velocity_that_they_hav
     coarse = fine.of(np.arange(len(fine.frames)) % (longest + 1) == 0)
     loads = SimpleNamespace(motion=fine, contacts=SimpleNamespace(touching=touching))
     monkeypatch.setattr(root_motion, "treadmill_speed", lambda *_: 1.0)
-    found = root_motion.lacking_velocity(coarse, loads, FlatTerrain())
-    np.testing.assert_allclose(found, -BELT, atol=0.01 * np.linalg.norm(BELT))
+    velocity = root_motion.lacking_velocity(coarse, loads, FlatTerrain())
+    np.testing.assert_allclose(velocity, -BELT, atol=0.01 * np.linalg.norm(BELT))

@@ -72,13 +72,13 @@ def changed(skin: SkinMotion, *, scale: float, turn: float, lift: float) -> Skin
     return SkinMotion(turned * scale, skin.part, skin.links, skin.rate, skin.height * scale)
 
 
-def assert_gait(found: SkinContacts, stands: np.ndarray) -> None:
+def assert_gait(contacts: SkinContacts, stands: np.ndarray) -> None:
     """Every foot is a contact, and nothing else; it bears when it stands, within two frames at each end."""
     legs = stands.shape[1]
-    assert sorted(set(found.group[:legs])) == list(range(legs)) == list(range(found.bears.shape[1]))
-    assert found.group[-1] == -1, "the trunk does not touch the ground"
+    assert sorted(set(contacts.group[:legs])) == list(range(legs)) == list(range(contacts.bears.shape[1]))
+    assert contacts.group[-1] == -1, "the trunk does not touch the ground"
     for leg in range(legs):
-        bears = found.bears[:, found.group[leg]]
+        bears = contacts.bears[:, contacts.group[leg]]
         wide = np.convolve(stands[:, leg], np.ones(5), "same") > 0
         narrow = np.convolve(~stands[:, leg], np.ones(5), "same") == 0
         inside = slice(2, -2)
@@ -109,11 +109,11 @@ def test_the_gait_of_an_animal_is_found_in_its_skin(
     seed: int,
 ) -> None:
     skin, stands = animal(legs, duty=duty, stride=stride, on_the_spot=on_the_spot, leaves=leaves, seed=seed)
-    found = find_contacts(changed(skin, scale=scale, turn=turn, lift=lift))
-    assert found.level / scale == pytest.approx(lift, abs=0.005)
-    assert_gait(found, stands)
+    contacts = find_contacts(changed(skin, scale=scale, turn=turn, lift=lift))
+    assert contacts.level / scale == pytest.approx(lift, abs=0.005)
+    assert_gait(contacts, stands)
     speed = stride * RATE / PERIOD if on_the_spot else 0.0
-    assert np.linalg.norm(found.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
+    assert np.linalg.norm(contacts.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
 
 
 @given(
@@ -129,12 +129,12 @@ def test_the_gait_is_found_on_stairs_and_how_high_each_foot_stands(
 ) -> None:
     riser = -riser if down else riser
     skin, stands = animal(2, duty=duty, stride=stride, riser=riser)
-    found = find_contacts(changed(skin, scale=scale, turn=turn, lift=0.3))
-    assert_gait(found, stands)
+    contacts = find_contacts(changed(skin, scale=scale, turn=turn, lift=0.3))
+    assert_gait(contacts, stands)
     for leg in range(2):
-        bears = found.bears[:, found.group[leg]]
+        bears = contacts.bears[:, contacts.group[leg]]
         sole = skin.positions[:, skin.part == leg, 2].min(axis=1) + 0.3
-        assert found.floor[bears, found.group[leg]] / scale == pytest.approx(sole[bears], abs=0.02)
+        assert contacts.floor[bears, contacts.group[leg]] / scale == pytest.approx(sole[bears], abs=0.02)
 
 
 @given(
@@ -161,15 +161,15 @@ def test_the_gait_is_found_at_other_frame_rates_in_parts_of_the_shot_and_in_coar
 ) -> None:
     skin, stands = animal(legs, duty=duty, stride=0.6, on_the_spot=on_the_spot)
     chance, seen = np.random.default_rng(seed), slice(first, first + length, every)
-    kept = chance.random(len(skin.part)) < share
-    kept |= np.diff(skin.part, prepend=-1) > 0  # of each part at least a point of its underside
-    positions = skin.positions[seen][:, kept]
+    chosen = chance.random(len(skin.part)) < share
+    chosen |= np.diff(skin.part, prepend=-1) > 0  # of each part at least a point of its underside
+    positions = skin.positions[seen][:, chosen]
     positions = positions + chance.normal(0, noise * skin.height, positions.shape)
-    found = find_contacts(SkinMotion(positions, skin.part[kept], skin.links, RATE / every, skin.height))
+    contacts = find_contacts(SkinMotion(positions, skin.part[chosen], skin.links, RATE / every, skin.height))
     speed = 0.6 * RATE / PERIOD if on_the_spot else 0.0
-    assert found.level == pytest.approx(0.0, abs=0.005 * skin.height)
-    assert np.linalg.norm(found.drift) == pytest.approx(speed, abs=0.1 * speed + 0.01)
-    assert_gait(found, stands[seen])
+    assert contacts.level == pytest.approx(0.0, abs=0.005 * skin.height)
+    assert np.linalg.norm(contacts.drift) == pytest.approx(speed, abs=0.1 * speed + 0.01)
+    assert_gait(contacts, stands[seen])
 
 
 def with_limb(skin: SkinMotion, height: np.ndarray, twin: np.ndarray) -> SkinMotion:
@@ -190,11 +190,11 @@ def test_a_hand_that_dips_to_the_ground_is_no_contact_where_its_twin_is_none(see
     dips = np.abs(np.arange(FRAMES) - landed - 4) < 3
     feet = np.array([1, 0])
     skin = with_limb(skin, np.where(dips, 0.0, 0.4), np.array([*feet, 2, -1]))  # the other hand is always high
-    found = find_contacts(
+    contacts = find_contacts(
         SkinMotion(skin.positions[seen], skin.part, skin.links, skin.rate / (seen.step or 1), 1.0, skin.twin)
     )
-    assert sorted(found.group) == [-1, -1, 0, 1]
-    assert (found.group[:2] >= 0).all()
+    assert sorted(contacts.group) == [-1, -1, 0, 1]
+    assert (contacts.group[:2] >= 0).all()
 
 
 @pytest.mark.parametrize("seen", [slice(None), slice(18, 72), slice(0, None, 2), slice(1, None, 2)])
@@ -203,11 +203,11 @@ def test_a_foot_that_only_brushes_the_ground_is_a_contact_beside_its_twin(seen: 
     kicks = np.abs(np.arange(FRAMES) - 40) > 2
     for twin, contacts in ((np.array([2, 1, 0]), 2), (np.array([0, 1, 2]), 1)):  # without one, it is a brush
         both = with_limb(skin, np.where(kicks, 0.3, 0.0), twin)
-        found = find_contacts(
+        measured = find_contacts(
             SkinMotion(both.positions[seen], both.part, both.links, both.rate / (seen.step or 1), 1.0, twin)
         )
-        assert found.bears.shape[1] == contacts
-        assert found.bears[:, found.group[0]].all()
+        assert measured.bears.shape[1] == contacts
+        assert measured.bears[:, measured.group[0]].all()
 
 
 def test_a_foot_that_kicks_and_stands_still_for_a_moment_is_a_contact() -> None:
@@ -217,8 +217,8 @@ def test_a_foot_that_kicks_and_stands_still_for_a_moment_is_a_contact() -> None:
     for drags, contacts in ((0.0, 2), (0.02, 1)):
         kicking = with_limb(skin, 0.02 * away, np.array([0, 1, 2]))
         kicking.positions[:, kicking.part == 2, 0] += (0.1 * away + drags * np.arange(FRAMES))[:, None]
-        found = find_contacts(kicking)
-        assert found.bears.shape[1] == contacts
+        seen = find_contacts(kicking)
+        assert seen.bears.shape[1] == contacts
 
 
 @pytest.mark.parametrize("on_the_spot", [False, True])
@@ -226,17 +226,17 @@ def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) ->
     skin, _ = animal(2, duty=0.6, stride=0.6, on_the_spot=on_the_spot)
     whole = find_contacts(skin)
     for end in range(45, FRAMES):
-        found = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
+        contacts = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
         # The speed of the last frame is known from one side alone.
-        assert (found.bears == whole.bears[:end])[:-1].all(), end
+        assert (contacts.bears == whole.bears[:end])[:-1].all(), end
 
 
 @pytest.mark.parametrize("seen", [1, 2, 3])
 def test_a_foot_that_comes_down_as_the_shot_ends_bears_once_two_frames_show_it(seen: int) -> None:
     skin, stands = animal(2, duty=0.5, stride=0.6)
     end = next(frame for frame in range(50, FRAMES) if stands[frame, 0] and not stands[frame - 1, 0]) + seen
-    found = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
-    assert found.bears[-1, found.group[0]] == (seen > 1)
+    contacts = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
+    assert contacts.bears[-1, contacts.group[0]] == (seen > 1)
 
 
 @pytest.mark.parametrize("pace", [0.05, 0.4])
@@ -333,11 +333,11 @@ def run_of(rate: float, sinks: float) -> tuple[SkinMotion, np.ndarray]:
 def test_the_ground_of_a_run_is_one_at_every_frame_rate_and_both_feet_print(rate: float, sinks: float) -> None:
     """Of feet that land alone, the higher one tells it: the other one sinks in."""
     skin, stands = run_of(rate, sinks)
-    found = find_contacts(skin)
-    assert found.level == pytest.approx(max(-sinks, 0.0), abs=0.012)
+    contacts = find_contacts(skin)
+    assert contacts.level == pytest.approx(max(-sinks, 0.0), abs=0.012)
     for foot in range(2):
-        seen = found.bears[:, found.group[foot]]
-        assert found.group[foot] >= 0
+        seen = contacts.bears[:, contacts.group[foot]]
+        assert contacts.group[foot] >= 0
         assert seen[stands[:, foot]].mean() > 0.7
         assert not seen[~np.convolve(stands[:, foot], np.ones(5), "same").astype(bool)].any()
 
@@ -378,9 +378,9 @@ def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_
     toe = skin.part == 0
     dips = ~stands[:, 0]
     positions[np.ix_(dips, toe)] -= (0, 0, 0.15)
-    found = find_contacts(SkinMotion(positions, skin.part, skin.links, skin.rate, skin.height))
-    assert found.level == pytest.approx(0.0, abs=0.006)
-    assert_gait(found, stands)
+    contacts = find_contacts(SkinMotion(positions, skin.part, skin.links, skin.rate, skin.height))
+    assert contacts.level == pytest.approx(0.0, abs=0.006)
+    assert_gait(contacts, stands)
 
 
 def test_a_foot_that_stands_in_two_pieces_is_one_contact() -> None:
@@ -390,9 +390,9 @@ def test_a_foot_that_stands_in_two_pieces_is_one_contact() -> None:
     order = np.argsort(part, kind="stable")
     links = np.pad(skin.links, (0, 1))
     links[0, -1] = links[-1, 0] = True
-    found = find_contacts(SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height))
-    assert found.group[0] == found.group[-1]
-    assert found.bears.shape[1] == 2
+    contacts = find_contacts(SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height))
+    assert contacts.group[0] == contacts.group[-1]
+    assert contacts.bears.shape[1] == 2
 
 
 def test_pieces_on_different_branches_that_move_alike_are_one_contact() -> None:
@@ -406,9 +406,9 @@ def test_pieces_on_different_branches_that_move_alike_are_one_contact() -> None:
     twins = np.array([1, 0, 2, 3]), np.array([1, -1, 2, 3])  # the right foot's twin may not be followed
     for twin, against, contacts in ((twins[0], beside, 2), (twins[1], beside, 2), (twins[0], None, 3)):
         skin_of_feet = SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height, twin, against)
-        found = find_contacts(skin_of_feet)
-        assert found.bears.shape[1] == contacts
-        assert (found.group[0] == found.group[3]) == (against is not None)
+        seen = find_contacts(skin_of_feet)
+        assert seen.bears.shape[1] == contacts
+        assert (seen.group[0] == seen.group[3]) == (against is not None)
 
 
 def test_what_is_one_foot_on_the_left_is_one_on_the_right() -> None:
@@ -454,9 +454,9 @@ def test_what_is_near_the_ground_and_still_comes_down_has_not_landed() -> None:
 def test_the_ground_lies_between_feet_that_stand_at_different_heights(apart: float, level: float) -> None:
     skin, stands = animal(2, duty=0.6, stride=0.6)
     skin.positions[:, skin.part == 1, 2] -= apart
-    found = find_contacts(skin)
-    assert found.level == pytest.approx(level, abs=0.001)
-    assert_gait(found, stands)
+    contacts = find_contacts(skin)
+    assert contacts.level == pytest.approx(level, abs=0.001)
+    assert_gait(contacts, stands)
 
 
 @pytest.mark.parametrize("rate", [24.0, 60.0])

@@ -45,5 +45,5 @@ def test_parts_of_other_sizes_are_no_twins_and_empty_ones_have_none() -> None:
     chance = np.random.default_rng(0)
     points = chance.uniform(-0.1, 0.1, (70, 3))
     points[:, 0] += np.where(np.arange(70) < 50, -1, 1)
-    found = twins(points, np.repeat([0, 2], [50, 20]), 3)
-    assert found.tolist() == [0, 1, 2]
+    pairs = twins(points, np.repeat([0, 2], [50, 20]), 3)
+    assert pairs.tolist() == [0, 1, 2]

@@ -113,13 +113,13 @@ def test_capes_skirts_and_hats_are_sheets_and_bodies_sleeves_and_legs_are_not():
     leg = capsule(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.01)
     head = without(sphere(0.12), lambda x, y, z: z > -0.1)
     vertices, triangles = united(
-        *(moved(one, (3.0 * k, 0, 0)) for k, one in enumerate((cape, thick, hat, sleeve, leg, head)))
+        *(moved(each, (3.0 * k, 0, 0)) for k, each in enumerate((cape, thick, hat, sleeve, leg, head)))
     )
-    found = pieces(vertices, triangles)
+    parts = pieces(vertices, triangles)
     place = vertices[triangles[:, 0], 0]
     each = [np.abs(place - 3.0 * k) < 1.0 for k in range(6)]
-    assert [set(found.is_sheet[one]) for one in each] == [{True}] * 3 + [{False}] * 3
-    assert [set(found.is_cloth[one]) for one in each] == [{True}] * 4 + [{False}] * 2
+    assert [set(parts.is_sheet[each]) for each in each] == [{True}] * 3 + [{False}] * 3
+    assert [set(parts.is_cloth[each]) for each in each] == [{True}] * 4 + [{False}] * 2
 
 
 def test_cloth_around_skin_is_no_body_and_cloth_around_nothing_is():
@@ -130,10 +130,10 @@ def test_cloth_around_skin_is_no_body_and_cloth_around_nothing_is():
 
 def test_components_are_those_of_a_random_graph():
     random = np.random.default_rng(0)
-    one, other = random.integers(0, 300, (2, 220))
-    label = components(300, one, other)
+    first, other = random.integers(0, 300, (2, 220))
+    label = components(300, first, other)
     known = [{node} for node in range(300)]
-    for a, b in zip(one, other, strict=True):
+    for a, b in zip(first, other, strict=True):
         if known[a] is not known[b]:
             known[a] |= known[b]
             for node in known[b]:

@@ -22,8 +22,8 @@ def pitch(angle):
     """Rotation about y, toes down for positive angles; (F, 3, 3)."""
     angle = np.atleast_1d(angle)
     c, s = np.cos(angle), np.sin(angle)
-    zero, one = np.zeros_like(c), np.ones_like(c)
-    return np.stack([np.stack([c, zero, s], -1), np.stack([zero, one, zero], -1), np.stack([-s, zero, c], -1)], -2)
+    zero, ones = np.zeros_like(c), np.ones_like(c)
+    return np.stack([np.stack([c, zero, s], -1), np.stack([zero, ones, zero], -1), np.stack([-s, zero, c], -1)], -2)
 
 
 def stepping(cycles=4, stance=36, swing=24):
@@ -113,8 +113,8 @@ def test_the_other_foot_lends_its_attitude_unless_it_contradicts():
     mirror = reflection(np.array((0.0, 0.2, 0.0)))
     lent = standing_up(nothing, [image @ mirror])
     np.testing.assert_allclose(lent, image[0, 2] * (1, -1, 1), atol=1e-12)
-    own = pitch(np.full(9, np.radians(-30)))
-    np.testing.assert_allclose(standing_up(own, [image @ mirror]), own[0, 2], atol=1e-12)
+    pitches = pitch(np.full(9, np.radians(-30)))
+    np.testing.assert_allclose(standing_up(pitches, [image @ mirror]), pitches[0, 2], atol=1e-12)
 
 
 def test_both_frames_of_a_flat_foot_coincide_when_it_stands():
@@ -166,7 +166,7 @@ def test_stubs_take_the_size_that_fits_the_leg():
 
 
 @pytest.mark.parametrize(
-    ("tip", "told"),
+    ("tip", "is_toe"),
     [
         ((0.2, 0.0, -0.05), True),  # straight ahead
         ((0.15, -0.03, -0.02), True),  # on the great toe, with the ball on the outer side
@@ -177,6 +177,6 @@ def test_stubs_take_the_size_that_fits_the_leg():
         ((0.0, 0.0, 0.2), False),
     ],
 )
-def test_a_tip_tells_where_a_foot_points_if_toes_end_there(tip, told):
+def test_a_tip_tells_where_a_foot_points_if_toes_end_there(tip, is_toe):
     ankle, ball = np.zeros(3), np.array((0.11, 0.04, -0.07))
-    assert ends_in_toes(ankle, ball, np.array(tip), np.array((0.0, 0.0, 1.0))) == told
+    assert ends_in_toes(ankle, ball, np.array(tip), np.array((0.0, 0.0, 1.0))) == is_toe

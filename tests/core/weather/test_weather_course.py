@@ -92,12 +92,12 @@ def test_a_weather_that_changes_is_what_a_simulation_makes_of_it(surface, seed):
         course = course_of(weather, matter, frame=frame, span=SPAN)
         for since in (1.0, 99.0, 141.0, 147.0):
             wanted = simulated(at, matter, since, frame, 0.7)
-            found = {
+            sums = {
                 name: course.since(since, getattr(course, name)) for name in ("cover", "thawed", "variance", "unfilled")
             }
             if matter.soaking:
-                found["excess"] = course.since(since, course.excess(0.7))
-            for name, value in found.items():
+                sums["excess"] = course.since(since, course.excess(0.7))
+            for name, value in sums.items():
                 top = max(wanted[name], LEAST[name])
                 assert value == pytest.approx(wanted[name], abs=0.01 * top), (name, frame, since)
             if matter.wet:
@@ -119,10 +119,10 @@ def test_what_was_melted_by_day_leaves_new_snow_of_the_next_night_alone():
     night = np.arange(PARTS + 1) // 64 % 2 == 0
     weather = Weather(np.where(night, 0.02 / HOUR, 0.0), np.where(night, -6.0, 20.0), time_scale=24 * 600.0)
     span, matter = Span(0.0, PARTS, 24.0), w.matter_of("snow", 0.4, 0.01)
-    one, noon, two = (course_of(weather, matter, frame=frame, span=span) for frame in (64.0, 128.0, 192.0))
+    morning, noon, two = (course_of(weather, matter, frame=frame, span=span) for frame in (64.0, 128.0, 192.0))
     assert noon.cover[0] == 0.0
     assert noon.thawed[0] > 0.02
-    assert two.cover[0] == pytest.approx(one.cover[0], rel=1e-6)
+    assert two.cover[0] == pytest.approx(morning.cover[0], rel=1e-6)
     assert two.thawed[0] == noon.thawed[0]
     since = two.since(128.0, two.thawed)
     assert since == 0.0

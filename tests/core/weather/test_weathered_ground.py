@@ -38,7 +38,7 @@ def track():
 
 
 @pytest.fixture(scope="module")
-def left(track):
+def imprinted(track):
     footprints, position = track
     ground = recompose(footprints)
     compression, rim = ground.sample(position[..., 0].ravel(), position[..., 1].ravel())
@@ -58,15 +58,15 @@ def left(track):
     return raw, relief, places
 
 
-def at(left, weather, frame, surface="snow", section=0.01):
-    _, relief, places = left
+def at(imprinted, weather, frame, surface="snow", section=0.01):
+    _, relief, places = imprinted
     matter = matter_of(surface, 0.3, section)
     result = weathered(places, relief.ravel(), weather, matter, frame=frame, span=SPAN)
     return replace(result, height=result.height.reshape(relief.shape))
 
 
-def test_the_blurred_relief_is_that_of_scipy(left):
-    raw, relief, places = left
+def test_the_blurred_relief_is_that_of_scipy(imprinted):
+    raw, relief, places = imprinted
     known = np.cumsum(np.concatenate([relief.reshape(-1, 1), places.blur], axis=1), axis=1)
     for sigma, ours in zip(SIGMAS, known.T[1:], strict=True):
         theirs = gaussian_filter(raw, np.hypot(sigma, BLUR) / CELL, mode="constant", truncate=4.0)
@@ -74,9 +74,9 @@ def test_the_blurred_relief_is_that_of_scipy(left):
         assert ours.sum() == pytest.approx(raw.sum(), rel=1e-4)  # no volume is lost
 
 
-def test_ages_are_those_of_the_contacts(track, left):
+def test_ages_are_those_of_the_contacts(track, imprinted):
     footprints, position = track
-    _, _, places = left
+    _, _, places = imprinted
     for footprint in footprints:
         near = np.hypot(*(position.reshape(-1, 3)[:, :2] - footprint.position[:2]).T).argmin()
         first, last, _ = places.times[near]
@@ -120,36 +120,36 @@ def test_a_print_changes_until_somebody_steps_into_it_and_as_a_new_one_after(tra
     begin = first.start_frame + 300
     away = single.times[:, 1] > 1e6
     for frame in (begin - 150, begin - 1):
-        results = (weathered(one, shown(first), sky, sand, frame=frame, span=SPAN) for one in (single, twice))
-        alone, now = (one.height - one.water for one in results)  # water stands in the last print
+        results = (weathered(each, shown(first), sky, sand, frame=frame, span=SPAN) for each in (single, twice))
+        alone, now = (result.height - result.water for result in results)  # water stands in the last print
         change = np.abs(alone - alone[away].max()).max()
         assert change > 2e-3
         np.testing.assert_allclose(now, alone, rtol=0, atol=0.01 * change)
     after = first.end_frame + 400
     np.testing.assert_array_equal(twice.times[:, 1], second.times[:, 1])
     trodden = twice.trodden[:, 0] > 0.99
-    alone, now = (weathered(one, shown(first), sky, sand, frame=after, span=SPAN) for one in (second, twice))
+    alone, now = (weathered(each, shown(first), sky, sand, frame=after, span=SPAN) for each in (second, twice))
     np.testing.assert_allclose(now.fresh[trodden], alone.fresh[trodden], atol=1e-6)
 
 
-def test_prints_apart_have_no_print_before_them(left):
-    _, _, places = left
+def test_prints_apart_have_no_print_before_them(imprinted):
+    _, _, places = imprinted
     assert not places.blur_before.any()
     assert (places.again[:, 0] < 0).all()
 
 
-def test_no_weather_changes_nothing_and_neither_does_any_before_the_bake(left):
+def test_no_weather_changes_nothing_and_neither_does_any_before_the_bake(imprinted):
     heavy = Weather(0.1 / HOUR, 5.0, 12.0, 30e-3 / HOUR, 1e-7, 1e3)
-    for result in (at(left, Weather(time_scale=1e5), 900.0), at(left, heavy, 1.0)):
+    for result in (at(imprinted, Weather(time_scale=1e5), 900.0), at(imprinted, heavy, 1.0)):
         assert not result.height.any()
         assert not result.fresh.any()
         assert not result.water.any()
 
 
-def test_a_print_is_gone_under_a_night_of_snow(left):
-    _, relief, places = left
+def test_a_print_is_gone_under_a_night_of_snow(imprinted):
+    _, relief, places = imprinted
     snow = Weather(snowfall=0.03 / HOUR, temperature=-5.0, time_scale=2880.0)
-    heights = [relief + at(left, snow, frame).height for frame in (60.0, 150.0, 400.0)]
+    heights = [relief + at(imprinted, snow, frame).height for frame in (60.0, 150.0, 400.0)]
     deep = relief < 0.8 * relief.min()
     away = places.times[:, 1].reshape(relief.shape) > 1e6
     depths = [float(height[away].mean() - height[deep].mean()) for height in heights]
@@ -198,26 +198,26 @@ def test_water_from_below_comes_up_to_its_table_in_seconds():
             assert now.height == pytest.approx(now.water)
 
 
-def test_sand_is_pale_around_a_loaded_foot_and_wet_again_seconds_after(left):
-    _, _, places = left
+def test_sand_is_pale_around_a_loaded_foot_and_wet_again_seconds_after(imprinted):
+    _, _, places = imprinted
     first, last, _ = places.times.T
     foot = (places.trodden[:, 0] > 0.9) & (last < 60.0)
     before, loaded, after = (
-        at(left, Weather(halo=1.0), frame, "wet_sand").dried
+        at(imprinted, Weather(halo=1.0), frame, "wet_sand").dried
         for frame in (first[foot].min() - 1, last[foot].max(), last[foot].max() + 10 * RATE)
     )
     assert not before[foot].any()
     assert loaded[foot].max() == pytest.approx(1.0, abs=0.05)
     assert after[foot].max() < 0.01
     assert not loaded[first > 1e6].any()
-    assert not at(left, Weather(halo=1.0), 60.0, "mud").dried.any()
+    assert not at(imprinted, Weather(halo=1.0), 60.0, "mud").dried.any()
 
 
-def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(left):
-    _, relief, _ = left
-    wind = at(left, Weather(wind=9.2, time_scale=100.0), 900.0, "sand")
+def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(imprinted):
+    _, relief, _ = imprinted
+    wind = at(imprinted, Weather(wind=9.2, time_scale=100.0), 900.0, "sand")
     assert np.abs(relief + wind.height).max() < 0.1 * np.abs(relief).max()
-    rain = at(left, Weather(rain=20e-3 / HOUR, time_scale=60.0), 900.0, "sand", 0.01)
+    rain = at(imprinted, Weather(rain=20e-3 / HOUR, time_scale=60.0), 900.0, "sand", 0.01)
     moved = np.where(rain.water.reshape(relief.shape) > 0, 0.0, rain.height)
     assert moved.sum() == pytest.approx(0.0, abs=2e-2 * np.abs(relief).sum())
     assert np.abs(relief + rain.height).max() < np.abs(relief).max()
@@ -226,8 +226,8 @@ def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(left):
 @pytest.mark.parametrize(
     "weather", [Weather(wind=9.0, time_scale=60.0), Weather(snowfall=3e-2 / HOUR, time_scale=2880.0)]
 )
-def test_creeping_sand_and_draping_snow_move_what_is_there_and_lose_none_of_it(left, weather):
-    raw, relief, places = left
+def test_creeping_sand_and_draping_snow_move_what_is_there_and_lose_none_of_it(imprinted, weather):
+    raw, relief, places = imprinted
     alike = replace(places, times=np.where([True, True, False], SPAN.first, places.times))  # all of one age
     bottomless = 1e9  # so that wind fills nothing
     moved = at((raw, relief, alike), weather, 300.0, "sand", bottomless)
@@ -237,9 +237,9 @@ def test_creeping_sand_and_draping_snow_move_what_is_there_and_lose_none_of_it(l
     assert abs(change.sum()) < 1e-4 * np.abs(relief).sum()
 
 
-def test_puddles_are_level_and_spill_no_higher_than_their_brim(left):
-    _, relief, places = left
-    rain = at(left, Weather(rain=40e-3 / HOUR, time_scale=240.0), 900.0, "mud")
+def test_puddles_are_level_and_spill_no_higher_than_their_brim(imprinted):
+    _, relief, places = imprinted
+    rain = at(imprinted, Weather(rain=40e-3 / HOUR, time_scale=240.0), 900.0, "mud")
     water = rain.water.reshape(relief.shape)
     assert (water > 0).sum() > 20
     surface = (relief + rain.height)[water > 0]
@@ -249,14 +249,14 @@ def test_puddles_are_level_and_spill_no_higher_than_their_brim(left):
     assert surface.max() < relief.max()
 
 
-def test_puddles_are_level_while_they_fill(left):
-    _, relief, places = left
-    rain = at(left, Weather(rain=30e-3 / HOUR, time_scale=20.0), 400.0, "mud")
+def test_puddles_are_level_while_they_fill(imprinted):
+    _, relief, places = imprinted
+    rain = at(imprinted, Weather(rain=30e-3 / HOUR, time_scale=20.0), 400.0, "mud")
     wet = rain.water > 0
     surface, since = (relief + rain.height).ravel()[wet.ravel()], places.levels[wet.ravel(), POWERS]
     assert 0.0 < rain.water.max() < 0.5 * np.ptp(relief)
-    for one in np.unique(since):
-        assert np.ptp(surface[since == one]) < 1e-9
+    for age in np.unique(since):
+        assert np.ptp(surface[since == age]) < 1e-9
 
 
 def test_the_water_level_of_a_print_is_that_of_its_volume_curve(track):

@@ -71,9 +71,9 @@ def weathered(
         # Trodden snow melts the less the denser it is, as fewer of its grains are open to the air, and stands up in
         # the end. That this goes with 1/density is by the pictures it gives.
         ratio = np.maximum(1.0 - compression / matter.snow_depth, 0.0)
-        left = np.maximum(matter.snow_depth + soft, 0.0)
-        around = np.minimum(course.thawed[0], left)
-        within = np.minimum(course.since(since, course.thawed) * ratio**2, left)
+        snow = np.maximum(matter.snow_depth + soft, 0.0)
+        around = np.minimum(course.thawed[0], snow)
+        within = np.minimum(course.since(since, course.thawed) * ratio**2, snow)
         change = change - around - lower * (within - around)
 
     water = _standing(places, relief + change, weather, matter, course)
@@ -113,11 +113,11 @@ def _standing(places: WeatherPlaces, height: Array, weather: Weather, matter: w.
     """Depth of the water above ground that is so high above its place at rest (K,) [m]."""
     if matter.soaking is None:
         return np.zeros_like(height)
-    capacity, above, left = places.pool.T
+    capacity, above, spilled = places.pool.T
     since, rise = places.levels[:, POWERS], places.levels[:, :POWERS]
     low, high = soaking_shares(places)
     at_low, at_high = (course.since(since, course.excess(share)) for share in (low, high))
-    excess = at_low + (at_high - at_low) * np.clip((left - low) / max(high - low, LEAST_RANGE), 0.0, 1.0)
+    excess = at_low + (at_high - at_low) * np.clip((spilled - low) / max(high - low, LEAST_RANGE), 0.0, 1.0)
     full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(height), where=capacity > 0), 0.0, 1.0))
     rain = (full[:, None] ** np.arange(1, POWERS + 1) * rise).sum(axis=-1)
     seep = np.maximum(rise.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)

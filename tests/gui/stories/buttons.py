@@ -55,7 +55,9 @@ def tell(hand: Hand, facts: dict) -> Steps:
 
 def with_a_job(kind: type) -> set[str]:
     """Names of the registered operators of a kind."""
-    names = {one.bl_idname.partition(".")[2] for one in kind.__subclasses__() if "bl_idname" in vars(one)}
+    names = {
+        subclasse.bl_idname.partition(".")[2] for subclasse in kind.__subclasses__() if "bl_idname" in vars(subclasse)
+    }
     return names.union(*map(with_a_job, kind.__subclasses__()))
 
 

@@ -85,7 +85,7 @@ def travel(armature: bpy.types.Object) -> float:
 
 def pitch(armature: bpy.types.Object) -> float:
     """How much the foot that is locked pitches in the five frames around [degrees]."""
-    character = next(one for one in scene().softground.characters if one.armature == armature)
+    character = next(each for each in scene().softground.characters if each.armature == armature)
     scene().frame_set(FRAME)
     slopes = {sole.bone: [] for sole in character.soles}
     lowest = min(slopes, key=lambda bone: place(armature, bone, FRAME)[2])

@@ -105,7 +105,7 @@ def go_live(hand: Hand) -> Steps:
 
 
 def back_and_forth(expected: np.ndarray) -> Steps:
-    """Whether the ground is as expected after the playhead went away and came back (a generator like the others)."""
+    """True if the ground is as expected after the playhead went away and came back (a generator like the others)."""
     for frame in (FRAME - 20, FRAME + 10, FRAME):
         scene().frame_set(frame)
         yield 0.2

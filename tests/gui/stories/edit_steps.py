@@ -156,9 +156,9 @@ def pressed(hand: Hand) -> Steps:
 def show_alone(panel: type, tab: str = "") -> None:
     """Show a panel once more, open and beside the others or in a tab: what a region has closed stays closed."""
     parts = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "draw", "draw_header")
-    kept = {name: getattr(panel, name) for name in parts if hasattr(panel, name)}
+    values = {name: getattr(panel, name) for name in parts if hasattr(panel, name)}
     shown = {"bl_idname": f"TEST_PT_alone_{tab.replace(' ', '_')}", "bl_options": set(), "bl_parent_id": ""}
-    shown |= kept | ({"bl_category": tab} if tab else {})
+    shown |= values | ({"bl_category": tab} if tab else {})
     bpy.utils.register_class(type(shown["bl_idname"], panel.__bases__, shown))
 
 
@@ -173,8 +173,8 @@ def steps() -> Any:
 
 def edits() -> dict:
     ground = scene().softground.ground
-    found = module("ground.baked_ground").edits_of(ground)
-    return {name: [edit.mute, *edit.move_m] for name, edit in found.items()}
+    edits = module("ground.baked_ground").edits_of(ground)
+    return {name: [edit.mute, *edit.move_m] for name, edit in edits.items()}
 
 
 def area_of(name: str) -> float:

@@ -24,7 +24,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.move(*hand.middle())
     yield from hand.picture("enabled", in_docs=False)
     ours = bpy.context.preferences.addons[ADD_ON].preferences
-    waits = [one.bl_idname for one in hand.window.modal_operators]
+    waits = [operator.bl_idname for operator in hand.window.modal_operators]
     facts["told where it is"] = ours.was_told and "SOFTGROUND_OT_tell_where" not in waits
     ours.default_preset = "Mud"
     facts["preferred"] = title()
@@ -102,13 +102,13 @@ def prints_in_view(hand: Hand) -> list[tuple[float, float, float]]:
     """Place in the viewport, 0 to 1 across and up, and width of each print that is there [px]."""
     window, view = hand.region("WINDOW"), hand.area().spaces.active.region_3d
     steps = module("operators.baked_steps")
-    found = []
+    places = []
     for step in steps.of(scene().softground.ground):
         corners = [location_3d_to_region_2d(window, view, point) for point in step.outline().tolist()]
         if step.there_from <= scene().frame_current and all(corners):
             across, up = (np.array(side) for side in zip(*corners, strict=True))
-            found.append((across.mean() / window.width, up.mean() / window.height, float(np.ptp(across))))
-    return found
+            places.append((across.mean() / window.width, up.mean() / window.height, float(np.ptp(across))))
+    return places
 
 
 def shading(hand: Hand) -> list:
@@ -140,8 +140,8 @@ def top_of(hand: Hand) -> float:
 def names(hand: Hand, member: str) -> list[str]:
     """Names of what the context of the viewport has, as one or several."""
     with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region("WINDOW")):
-        found = getattr(bpy.context, member)
-    return sorted(one.name for one in found) if isinstance(found, list) else [*found.objects.keys()]
+        value = getattr(bpy.context, member)
+    return sorted(each.name for each in value) if isinstance(value, list) else [*value.objects.keys()]
 
 
 def title() -> str:
@@ -156,7 +156,7 @@ def looks(ground: bpy.types.Object) -> list[str]:
 
 def layers(figure: bpy.types.Object) -> list[str]:
     """Names of the constraints on the figure and its bones, each once."""
-    return sorted({one.name for owner in (figure, *figure.pose.bones) for one in owner.constraints})
+    return sorted({constraint.name for owner in (figure, *figure.pose.bones) for constraint in owner.constraints})
 
 
 def summary() -> dict:

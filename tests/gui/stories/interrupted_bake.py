@@ -57,9 +57,9 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     for kind, progress in (("rig", READING), ("rig", PRESSING), ("ground", PRESSING), ("scene", READING)):
         yield from begin(hand, progress)
         delete(hand, kind)
-        left = without_traces(fingerprints.of_file())
+        after = without_traces(fingerprints.of_file())
         yield from hand.wait_for(lambda: not session().is_baking, 120)
-        facts[f"deleted {kind} at {progress}: changed"] = differences(left, fingerprints.of_file())
+        facts[f"deleted {kind} at {progress}: changed"] = differences(after, fingerprints.of_file())
         yield from reopen(hand, shot)
 
     # another file is opened
@@ -172,9 +172,11 @@ def delete(hand: Hand, kind: str) -> None:
         bpy.data.objects.remove(rig() if kind == "rig" else scene().softground.ground)
 
 
-def without_traces(found: dict) -> dict:
+def without_traces(traces: dict) -> dict:
     """A fingerprint that was taken while a bake ran, without what exists only then."""
-    return {kind: {k: v for k, v in things.items() if "SoftGround Sampling" not in k} for kind, things in found.items()}
+    return {
+        kind: {k: v for k, v in things.items() if "SoftGround Sampling" not in k} for kind, things in traces.items()
+    }
 
 
 def differences(before: dict, after: dict) -> list[str]:

@@ -55,9 +55,9 @@ def seen() -> dict:
         "read": sorted(module("state").state.catalogues),
         "texts": looked_up(),
         "otherwise in our context": [
-            text for text, own in texts.items() if translate(text, translation.CONTEXT) != own
+            text for text, ours in texts.items() if translate(text, translation.CONTEXT) != ours
         ],
-        "otherwise in Blender's": [text for text, own in texts.items() if translate(text) != own],
+        "otherwise in Blender's": [text for text, ours in texts.items() if translate(text) != ours],
     }
 
 

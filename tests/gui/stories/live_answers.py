@@ -50,9 +50,9 @@ def tell(hand: Hand, facts: dict) -> Steps:
     ground = scene().softground.ground
     facts["kept"] = "softground_record" in ground.data
     facts["outdated"] = bpy.context.window_manager.softground.stale
-    kept = heights()
+    kept_heights = heights()
     bpy.ops.softground.bake("EXEC_DEFAULT")
-    facts["baked again: differs by"] = float(np.abs(heights() - kept).max())
+    facts["baked again: differs by"] = float(np.abs(heights() - kept_heights).max())
 
 
 def scene():

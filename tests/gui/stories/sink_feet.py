@@ -81,8 +81,8 @@ def floating() -> float:
 def show_open(panel: type) -> None:
     """Show once more, open, a panel that is closed until one opens it: what a region has closed stays closed."""
     shown = {"bl_idname": "TEST_PT_open", "bl_options": set(), "draw": panel.draw}
-    kept = {name: getattr(panel, name) for name in _PLACE}
-    bpy.utils.register_class(type("TEST_PT_open", panel.__bases__, shown | kept))
+    values = {name: getattr(panel, name) for name in _PLACE}
+    bpy.utils.register_class(type("TEST_PT_open", panel.__bases__, shown | values))
 
 
 _PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "bl_parent_id")

@@ -23,8 +23,8 @@ def tell(hand: Hand, facts: dict) -> Steps:
     hand.show_wires()
     facts["sessions"] = []
     for seed in range(SESSIONS):
-        told: dict[str, Any] = {"deeds": [], "undone": {}, "redone": {}}
-        facts["sessions"].append(told)
+        noted: dict[str, Any] = {"deeds": [], "undone": {}, "redone": {}}
+        facts["sessions"].append(noted)
         begin(hand)
         states = [state()]
         chance = random.Random(seed)
@@ -35,16 +35,16 @@ def tell(hand: Hand, facts: dict) -> Steps:
                 continue
             yield 0.3
             yield from hand.wait_for(lambda: not session().is_baking, 120)
-            told["deeds"].append(name)
+            noted["deeds"].append(name)
             states.append(state())
         for step in reversed(range(STEPS)):
             yield from hand.key("Z", ctrl=True)
             yield 0.3
-            told["undone"][step] = differences(states[step], state())
+            noted["undone"][step] = differences(states[step], state())
         for step in range(1, STEPS + 1):
             yield from hand.key("Z", ctrl=True, shift=True)
             yield 0.3
-            told["redone"][step] = differences(states[step], state())
+            noted["redone"][step] = differences(states[step], state())
 
 
 def begin(hand: Hand) -> None:
@@ -113,7 +113,7 @@ def state() -> dict[str, Any]:
     return fingerprints.of_file() | {
         "settings": {
             "ground": options.ground.name if options.ground else None,
-            "characters": [one.name for one in options.characters],
+            "characters": [character.name for character in options.characters],
             "cell_size": options.cell_size,
             "stiffness": options.material.youngs_modulus,
         }

@@ -9,18 +9,18 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ...core.composers.edited_contacts import swapped
 from ...core.errors import InputError
 from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics.arrays import Array
 from ...core.numerics.rigid import rotation
+from ...core.pressing.edited_contacts import swapped
 from ...core.record import record
 from ...core.record.contact_steps import PressingSole, Steps
 from ...core.record.edits import UNCHANGED, StepEdit, feet, sole_of
 from ...core.record.footprints import Footprint
 from .. import session
-from ..ground import baked_ground
 from ..state import state
+from . import baked_ground
 
 APART = 1.2
 """How far ahead of a step its copy lies, in lengths of its outline."""
@@ -43,7 +43,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def is_edited(self) -> bool:
-        """Return whether there is anything to be reset."""
+        """True if there is anything to be reset."""
         return self.is_copy or self.edit != UNCHANGED
 
     @property
@@ -90,7 +90,7 @@ class BakedStep(record.EditableStep):
 
     @property
     def has_foot(self) -> bool:
-        """Return whether a foot made it, and neither a ball nor a wheel."""
+        """True if a foot made it, and neither a ball nor a wheel."""
         made_by = self.baked.pressed_by
         return made_by is not None and made_by.pressing.sole.prop is None
 

@@ -8,7 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import QUANTUM, Changes
-from softground_addon.core.record.sole_marks import sole_marks
+from softground_addon.core.relief.sole_marks import sole_marks
 from tests.core.walkers import box_sole, pressed, standing
 
 SNOW = GroundMaterial(375e3, 0.05, 0.2)

@@ -41,7 +41,7 @@ class NodeGraph:
     Parameters
     ----------
     known : bool
-        Whether it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
+        True if it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
     """
 
     def __init__(self, tree: Any, *, known: bool = False) -> None:
@@ -53,8 +53,7 @@ class NodeGraph:
         self._links: set[tuple[Any, Any]] = set()
 
     def finish(self, geometry: Any) -> None:
-        node = self.node("NodeGroupOutput")
-        self.link(geometry, node.inputs["Geometry"])
+        self.node("NodeGroupOutput", {"Geometry": geometry})
         if self._known is not None:
             links = {(link.from_socket, link.to_socket) for link in self.tree.links}
             if next(self._known, None) is not None or links != self._links:
@@ -65,7 +64,8 @@ class NodeGraph:
     def next_row(self) -> None:
         self._place = [2 * COLUMN, self._place[1] - ROW]
 
-    def node(self, kind: str, **properties: Any) -> Any:
+    def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
+        """A node with its properties set and its inputs, given by name or position, linked or set."""
         if self._known is None:
             node = self.tree.nodes.new(kind)
             node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
@@ -78,6 +78,8 @@ class NodeGraph:
         for name, value in properties.items():
             if getattr(node, name) != value:
                 setattr(node, name, value)
+        for key, source in (inputs or {}).items():
+            self.link(source, node.inputs[key])
         return node
 
     def link(self, source: Any, socket: Any) -> None:
@@ -98,45 +100,39 @@ class NodeGraph:
 
     def attribute(self, name: str, kind: str = "FLOAT") -> Any:
         def make() -> Any:
-            node = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
-            self.link(name, node.inputs["Name"])
-            return node.outputs["Attribute"]
+            return self.node("GeometryNodeInputNamedAttribute", {"Name": name}, data_type=kind).outputs["Attribute"]
 
         return self._once(name, kind, make=make)
 
+    def frame(self) -> Any:
+        """The scene's frame, with its fraction."""
+        return self.node("GeometryNodeInputSceneTime").outputs["Frame"]
+
+    def position(self) -> Any:
+        """Where each point is."""
+        return self.node("GeometryNodeInputPosition").outputs["Position"]
+
     def without(self, geometry: Any, selection: Any) -> Any:
         """The geometry without the selected vertices."""
-        node = self.node("GeometryNodeDeleteGeometry", domain="POINT")
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        return node.outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Selection": selection}
+        return self.node("GeometryNodeDeleteGeometry", inputs, domain="POINT").outputs["Geometry"]
 
     def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
         """Put the selected vertices elsewhere."""
-        node = self.node("GeometryNodeSetPosition")
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        self.link(position, node.inputs["Position"])
-        self.link(offset, node.inputs["Offset"])
-        return node.outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Selection": selection, "Position": position, "Offset": offset}
+        return self.node("GeometryNodeSetPosition", inputs).outputs["Geometry"]
 
     def put_higher(self, geometry: Any, up: Any, height: Any) -> Any:
         """Put all vertices higher by multiples of a vector; a position is set faster than an offset."""
-        node = self.node("GeometryNodeSetPosition")
-        self.link(geometry, node.inputs["Geometry"])
-        position = self.node("GeometryNodeInputPosition").outputs["Position"]
-        self.link(self.vector("ADD", position, self.scaled(up, height)), node.inputs["Position"])
-        return node.outputs["Geometry"]
+        position = self.vector("ADD", self.position(), self.scaled(up, height))
+        return self.node("GeometryNodeSetPosition", {"Geometry": geometry, "Position": position}).outputs["Geometry"]
 
     def store(
         self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT", domain: str = "POINT"
     ) -> Any:
         """Give the selected vertices, or what else a domain has, another value of that name."""
-        node = self.node("GeometryNodeStoreNamedAttribute", data_type=kind, domain=domain)
-        self.link(name, node.inputs["Name"])
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        self.link(value, node.inputs["Value"])
+        inputs = {"Name": name, "Geometry": geometry, "Selection": selection, "Value": value}
+        node = self.node("GeometryNodeStoreNamedAttribute", inputs, data_type=kind, domain=domain)
         return node.outputs["Geometry"]
 
     def captured(self, geometry: Any, *numbers: Number, kind: str = "FLOAT") -> tuple[Any, list[Number]]:
@@ -156,19 +152,15 @@ class NodeGraph:
     def forgotten(self, geometry: Any, *names: str) -> Any:
         """The geometry without some attributes."""
         for name in names:
-            node = self.node("GeometryNodeRemoveAttribute")
-            self.link(geometry, node.inputs["Geometry"])
-            self.link(name, node.inputs["Name"])
-            geometry = node.outputs["Geometry"]
+            inputs = {"Geometry": geometry, "Name": name}
+            geometry = self.node("GeometryNodeRemoveAttribute", inputs).outputs["Geometry"]
         return geometry
 
     def math(self, operation: str, first: Any, second: Any = 0.0, *, clamped: bool = False) -> Any:
         """Result of an operation, between 0 and 1 if it is clamped."""
 
         def make() -> Any:
-            node = self.node("ShaderNodeMath", operation=operation, use_clamp=clamped)
-            self.link(first, node.inputs[0])
-            self.link(second, node.inputs[1])
+            node = self.node("ShaderNodeMath", {0: first, 1: second}, operation=operation, use_clamp=clamped)
             return node.outputs["Value"]
 
         return self._once(operation, first, second, clamped, make=make)
@@ -180,65 +172,45 @@ class NodeGraph:
         return self.logic("OR", first, second)
 
     def logic(self, operation: str, *operands: Any) -> Any:
-        node = self.node("FunctionNodeBooleanMath", operation=operation)
-        for operand, socket in zip(operands, node.inputs, strict=False):  # for one there may be two sockets
-            self.link(operand, socket)
-        return node.outputs["Boolean"]
+        return self.node("FunctionNodeBooleanMath", dict(enumerate(operands)), operation=operation).outputs["Boolean"]
 
     def compare(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("FunctionNodeCompare", data_type="FLOAT", operation=operation)
-        self.link(first, node.inputs["A"])
-        self.link(second, node.inputs["B"])
-        return node.outputs["Result"]
+        inputs = {"A": first, "B": second}
+        return self.node("FunctionNodeCompare", inputs, data_type="FLOAT", operation=operation).outputs["Result"]
 
     def scaled(self, vector: Any, factor: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath", operation="SCALE")
-        self.link(vector, node.inputs[0])
-        self.link(factor, node.inputs["Scale"])
-        return node.outputs["Vector"]
+        return self.node("ShaderNodeVectorMath", {0: vector, "Scale": factor}, operation="SCALE").outputs["Vector"]
 
     def separated(self, vector: Any) -> list[Any]:
         def make() -> list[Any]:
-            node = self.node("ShaderNodeSeparateXYZ")
-            self.link(vector, node.inputs["Vector"])
-            return list(node.outputs)
+            return list(self.node("ShaderNodeSeparateXYZ", {"Vector": vector}).outputs)
 
         return self._once("separated", vector, make=make)
 
     def sample(self, splines: Any, number: Any, length: Any) -> Any:
         """A node that looks at one of the splines, at a length along it."""
-        node = self.node("GeometryNodeSampleCurve", mode="LENGTH", data_type="FLOAT", use_all_curves=False)
-        self.link(splines, node.inputs["Curves"])
-        self.link(length, node.inputs["Length"])
-        self.link(number, node.inputs["Curve Index"])
-        return node
+        inputs = {"Curves": splines, "Length": length, "Curve Index": number}
+        return self.node("GeometryNodeSampleCurve", inputs, mode="LENGTH", data_type="FLOAT", use_all_curves=False)
 
     def accumulated(self, parts: Any, kind: str = "FLOAT") -> Any:
         """A node with sums of a field over points: those before each, those up to and with it, and of all."""
-        node = self.node("GeometryNodeAccumulateField", data_type=kind, domain="POINT")
-        self.link(parts, node.inputs["Value"])
-        return node
+        return self.node("GeometryNodeAccumulateField", {"Value": parts}, data_type=kind, domain="POINT")
 
     def object_geometry(self, obj: bpy.types.Object, name: str) -> Any:
         """The geometry of an object, by a node of this name."""
-        node = self.node("GeometryNodeObjectInfo", label=name)
+        node = self.node("GeometryNodeObjectInfo", {"Object": obj}, label=name)
         if node.name != name:
             node.name = name
-        self.link(obj, node.inputs["Object"])
         return node.outputs["Geometry"]
 
     def points(self, count: int) -> Any:
         """So many points."""
-        node = self.node("GeometryNodePoints")
-        self.link(count, node.inputs["Count"])
-        return node.outputs[0]
+        return self.node("GeometryNodePoints", {"Count": count}).outputs[0]
 
     def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
         """Value of a field at one of a geometry's points, or at the last of them."""
-        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT", clamp=True)
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(value, node.inputs["Value"])
-        self.link(index, node.inputs["Index"])
+        inputs = {"Geometry": geometry, "Value": value, "Index": index}
+        node = self.node("GeometryNodeSampleIndex", inputs, data_type=kind, domain="POINT", clamp=True)
         return node.outputs["Value"]
 
     def repeated(
@@ -259,25 +231,16 @@ class NodeGraph:
 
     def combined(self, *parts: Any) -> Any:
         """A vector of up to three numbers."""
-        node = self.node("ShaderNodeCombineXYZ")
-        for part, socket in zip(parts, node.inputs, strict=False):
-            self.link(part, socket)
-        return node.outputs["Vector"]
+        return self.node("ShaderNodeCombineXYZ", dict(enumerate(parts))).outputs["Vector"]
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
         """One or the other; a number is true if it is above 0."""
-        node = self.node("GeometryNodeSwitch", input_type=kind)
-        self.link(switch, node.inputs["Switch"])
-        self.link(when_false, node.inputs["False"])
-        self.link(when_true, node.inputs["True"])
-        return node.outputs["Output"]
+        inputs = {"Switch": switch, "False": when_false, "True": when_true}
+        return self.node("GeometryNodeSwitch", inputs, input_type=kind).outputs["Output"]
 
     def vector(self, operation: str, *vectors: Any, output: str = "Vector") -> Any:
         """An operation on vectors."""
-        node = self.node("ShaderNodeVectorMath", operation=operation)
-        for vector, socket in zip(vectors, node.inputs, strict=False):
-            self.link(vector, socket)
-        return node.outputs[output]
+        return self.node("ShaderNodeVectorMath", dict(enumerate(vectors)), operation=operation).outputs[output]
 
     def parts(self, vector: Any) -> list[Number]:
         """The three numbers of a vector."""
@@ -292,7 +255,7 @@ class NodeGraph:
 
 
 def _is(value: Any, other: Any) -> bool:
-    """Return whether a socket's value is another one, as Blender rounds numbers."""
+    """True if a socket's value is another one, as Blender rounds numbers."""
     if isinstance(other, bool | int | float) or (isinstance(other, tuple | list) and value is not None):
         return np.array_equal(np.asarray(value, np.float32), np.asarray(other, np.float32))
     return bool(value == other)

@@ -2,20 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import bpy
 
-from .compat import write_input
+from ..compat import write_input
 
 
-def new_group(name: str, mark: str) -> Any:
-    """A new, empty group for a modifier, with a custom property by which it is known whatever the user calls it."""
+class GroupInput(NamedTuple):
+    """An input of a group: its value at first, its range, and the kind of its socket as Blender's types end."""
+
+    name: str
+    value: Any
+    meaning: str
+    span: tuple[float, float] | None = None
+    kind: str = "Float"
+
+
+def new_group(name: str, mark: str, inputs: Iterable[GroupInput] = ()) -> Any:
+    """A new group for a modifier: geometry in and out, inputs, and no nodes.
+
+    It has a custom property by which it is known whatever the user calls it.
+    """
     tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
     tree.is_modifier = True
     tree[mark] = True
+    add_sockets(tree, inputs)
     return tree
+
+
+def add_sockets(tree: Any, inputs: Iterable[GroupInput]) -> None:
+    """Give a group geometry in and out, and inputs."""
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    for name, value, meaning, span, kind in inputs:
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
+        socket.description = meaning
+        if value is not None:
+            socket.default_value = value
+        if span:
+            socket.min_value, socket.max_value = span
 
 
 def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:

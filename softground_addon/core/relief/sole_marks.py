@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..ground.sparse_grid import SparseGrid
-from .footprints import Footprint
+from ..record.footprints import Footprint
 
 LEVEL, STEEP = 0.4, 0.8
 """Slopes of a print, beside that of the ground: a sole leaves all of its mark up to the first, and none from the second
