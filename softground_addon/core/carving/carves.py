@@ -132,12 +132,11 @@ def carves_of(
 def _deep(footprints: Mapping[int, Footprint], first: float, last: float) -> set[int]:
     """Numbers of the deep prints; with those that an end of the shot cuts, of soles that leave deep ones."""
     deep = {number for number, print in footprints.items() if is_deep(print)}
-    soles = {(print.character, print.sole) for number, print in footprints.items() if number in deep}
-    for number, print in footprints.items():
-        is_cut = print.start_frame < first + 1 or print.end_frame > last - 1
-        if is_cut and (print.character, print.sole) in soles:
-            deep.add(number)
-    return deep
+    soles = {(footprints[number].character, footprints[number].sole) for number in deep}
+    cut = {
+        number for number, print in footprints.items() if print.start_frame < first + 1 or print.end_frame > last - 1
+    }
+    return deep | {number for number in cut if (footprints[number].character, footprints[number].sole) in soles}
 
 
 def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:

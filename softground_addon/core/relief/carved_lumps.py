@@ -33,7 +33,7 @@ def is_carve(footprint: Footprint) -> bool:
 
 def lying(footprints: Sequence[Footprint]) -> HeightField | None:
     """The ground as all bodies carved it; None if they did not."""
-    carves = [footprint for footprint in footprints if is_carve(footprint)]
+    carves = list(filter(is_carve, footprints))
     return recompose(carves) if carves else None
 
 
