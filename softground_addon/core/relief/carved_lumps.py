@@ -26,14 +26,9 @@ DEEPEST = 0.5
 """The loose matter between lumps sinks by no more than this part of it."""
 
 
-def is_carve(footprint: Footprint) -> bool:
-    """True of what bodies carved beside a print."""
-    return not len(footprint.contact_cells)
-
-
 def lying(footprints: Sequence[Footprint]) -> HeightField | None:
     """The ground as all bodies carved it; None if they did not."""
-    carves = list(filter(is_carve, footprints))
+    carves = [footprint for footprint in footprints if not len(footprint.contact_cells)]
     return recompose(carves) if carves else None
 
 

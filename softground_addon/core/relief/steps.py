@@ -16,7 +16,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
-from .carved_lumps import is_carve, lumps, lying
+from .carved_lumps import lumps, lying
 from .print_relief import FINEST_CRUMB, relief_of_print
 from .tread import SoleTread
 
@@ -98,7 +98,7 @@ def relief_of_steps(
     steps = []
     for footprint in footprints:
         yield
-        if loose and is_carve(footprint):
+        if loose and not len(footprint.contact_cells):
             steps.append(_carve(footprint, loose, places, lumped, water, wanted))
         else:
             steps.append(_step(footprint, places, standing, water, wanted, blur_sigma))
