@@ -104,7 +104,7 @@ marathon: $(READY)
 	$(PYTEST) $(SIDE_BY_SIDE) -m marathon $(TESTS)
 
 bench: $(READY)
-	$(PYTEST) -s -m benchmark $(TESTS)
+	$(PYTEST) -m benchmark $(TESTS)
 
 validate: $(READY)
 	$(BIN)/python -m tests.validation.validate $(DATA)

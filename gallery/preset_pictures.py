@@ -21,6 +21,8 @@ SIZE = 96
 
 COLOURS = 40
 SAMPLES = 24
+WIDE = {"ground_margin": "1.0"}
+"""The picture shows no end of the ground."""
 LENS = 62.0
 """Closer than the picture of four grounds: the print fills the picture [mm]."""
 
@@ -36,7 +38,7 @@ def prints(names: Sequence[str], size: int) -> Iterator[tuple[str, Path]]:
     """Bake a walk on each preset: its name, and a square picture of a print that is there until the next."""
     with addon(), TemporaryDirectory() as folder:
         scene = bpy.context.scene
-        built = four_grounds.build(scene, presets=names)
+        built = four_grounds.build(scene, options=WIDE, presets=names)
         stage.set_up_rendering(scene)
         scene.frame_set(scene.frame_end)
         for walker in built.walkers:
@@ -45,6 +47,8 @@ def prints(names: Sequence[str], size: int) -> Iterator[tuple[str, Path]]:
         four_grounds.light(scene, four_grounds.close_up_of(first.footprints))
         camera = stage.add_camera(scene, "Close-up", LENS)
         for name, bake in built.bakes.items():
+            for other in built.bakes.values():  # they lie over each other
+                other.ground.hide_render = other is not bake
             four_grounds.aim_at_print(camera, four_grounds.close_up_of(bake.footprints))
             rendered = Path(folder) / "rendered.png"
             stage.render(scene, camera, rendered, (size, size), SAMPLES)

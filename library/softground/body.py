@@ -14,6 +14,7 @@ from ._core.capture.skeleton import Skeleton, skeleton_of
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
 from ._core.motion.people import likely_mass
+from ._core.motion.units import scale_to_metres, wrong_unit
 from ._core.numerics.slices import result_of
 from ._core.rig.bare_body import bare_body, body_motion, recorded, with_toes
 from ._core.rig.bones import RestBone
@@ -113,12 +114,16 @@ class Body:
         """
         paths = {joint: bridged(np.asarray(path, dtype=float)) for joint, path in joints.items()}
         if missing := [joint for joint in _NEEDED if joint not in paths]:
-            raise InputError(f"the joints {', '.join(missing)} are missing: give their paths, (frames, 3) in metres")
-        count = len(paths[_NEEDED[0]])
+            raise InputError(
+                f"the joints {', '.join(missing)} are missing: give their paths, (frames, 3) in metres",
+                "missing_joints",
+                missing=missing,
+            )
+        count = max(len(paths[_NEEDED[0]]), 2)  # a motion has two frames at least
         check_length(count, rate)
         wrong = [joint for joint, path in paths.items() if path.shape != (count, 3) or not np.isfinite(path).all()]
         if wrong:
-            raise InputError(f"the path of {wrong[0]} is not numbers of the shape ({count}, 3)")
+            raise InputError(f"the path of {wrong[0]} is not numbers of the shape ({count}, 3)", "wrong_shape")
         paths.setdefault("hips", (paths["hip_l"] + paths["hip_r"]) / 2)
         skeleton = skeleton_of(CapturedBody(paths, rate))
         body = cls.from_skeleton(skeleton, mass=mass, name=name, plates=plates)
@@ -153,15 +158,17 @@ class Body:
         check_length(len(skeleton.poses), skeleton.rate)
         bones = rest_bones(skeleton)
         if not (np.abs(skeleton.poses) < _FARTHEST).all() or len(skeleton.poses) < 2:
-            raise InputError(f"'{name}' has fewer than two poses, or some that are no numbers up to {_FARTHEST:,.0f} m")
+            raise InputError(f"'{name}' has fewer than two poses, or numbers beyond {_FARTHEST:,.0f} m", "wrong_shape")
         mapping = map_by_names(bones, bones.keys()) if joints is None else _mapped(joints)
         if mapping is None or not mapping.soles:
             raise InputError(
                 f"no feet are found among the bones {', '.join([*bones][:12])}...: give joints={{'ankle_l': "
-                "(BONE, 'head'), ...}, at least both ankles"
+                "(BONE, 'head'), ...}, at least both ankles",
+                "no_feet",
+                bones=[*bones],
             )
         if unknown := {bone for bone, _ in mapping.joints.values()} - bones.keys():
-            raise InputError(f"there is no bone {', '.join(sorted(unknown))}: the bones are {', '.join(bones)}")
+            raise InputError(f"no bone {', '.join(sorted(unknown))} among the bones {', '.join(bones)}", "unknown_bone")
         recording = Recording(
             np.arange(len(skeleton.poses), dtype=float),
             tuple(bones),
@@ -171,6 +178,11 @@ class Body:
             SceneUnits(skeleton.rate, 1.0, GRAVITY, 1.0),
         )
         motion = result_of(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
+        if motion.four_legged and len(mapping.soles) == 2:
+            hands = [SoleSource(f"hand.{s.upper()}", s.upper(), mapping.joints[f"wrist_{s}"][0]) for s in "lr"]
+            paws = [replace(paw, limb=True, toe_bone="") for paw in (*mapping.soles, *hands)]
+            mapping = replace(mapping, soles=tuple(paws))
+            motion = result_of(assemble_motion(name, bones, mapping, recording, None, mass=1.0, carried={}))
         return _weighed(motion, mass, 0.0, plates)
 
     @classmethod
@@ -197,26 +209,24 @@ class Body:
         """
         where, faces = np.asarray(positions, dtype=float), np.asarray(triangles, dtype=np.intp)
         if where.ndim != 3 or where.shape[2] != 3 or len(where) < 2 or not np.isfinite(where).all():
-            raise InputError(
-                f"positions are of shape {where.shape}: finite numbers of (frames, vertices, 3) are needed"
-            )
+            raise InputError(f"positions are of shape {where.shape}, not finite (frames, vertices, 3)", "wrong_shape")
         if (
             faces.ndim != 2
             or faces.shape[1] != 3
             or not len(faces)
             or not 0 <= faces.min() <= faces.max() < where.shape[1]
         ):
-            raise InputError("triangles must be rows of three numbers of vertices")
+            raise InputError("triangles must be rows of three numbers of vertices", "wrong_shape")
         check_length(len(where), rate)
         chosen = np.unique(np.linspace(0, len(where) - 1, _POSES).round().astype(int))
         body = bare_body(where[chosen], faces, [(name, where.shape[1])])
         if body.is_rigid:
-            raise InputError("the mesh moves as one rigid piece: only bodies with parts that move are read")
+            raise InputError("the mesh moves as one rigid piece: only bodies with moving parts are read", "rigid_body")
         units = SceneUnits(rate, 1.0, GRAVITY, 1.0)
         recording = recorded(body, where[:, body.followed], range(len(where)), units)
         soles = with_toes(shown_by_skin(body.bones, body.skin, recording), recording)
         if not soles:
-            raise InputError("no part of the mesh rests on the ground: it needs Z up, metres, and some contact")
+            raise InputError("no part of the mesh rests on the ground: it needs Z up and metres", "no_contact")
         volume = skin_mass(body.skin, body.bones, recording.of(np.array([0])))
         work = body_motion(name, body, RigMapping(soles=soles), recording, mass=1.0, skin_mass=volume)
         return _weighed(result_of(work), mass, volume, ())
@@ -245,7 +255,12 @@ def _weighed(motion: CharacterMotion, mass: float | None, volume: float, plates:
     source = "given"
     if mass is None:
         mass, source = likely_mass(volume or np.inf, motion.size, two_legs=motion.two_legs)
+        if not np.isfinite(mass):
+            raise InputError(f"nothing tells what '{motion.name}' weighs: give its mass in kg", "mass", mass=None)
+    if scale_to_metres(motion.size) != 1.0 and (source != "given" or motion.two_legs):
+        wrong = f"'{motion.name}' is {motion.size:.3g} m large, as of a file in {wrong_unit(motion.size)}: give metres"
+        raise InputError(wrong, "wrong_unit", size=motion.size, factor=scale_to_metres(motion.size))
     if not (np.isfinite(mass) and mass > 0):
-        raise InputError(f"the mass of '{motion.name}' is {mass:g} kg: give a positive mass in kg")
+        raise InputError(f"the mass of '{motion.name}' is {mass:g} kg: give a positive mass in kg", "mass", mass=mass)
     weighed = replace(motion, mass=float(mass))
     return Body(weighed, weighed, source, tuple(plates))

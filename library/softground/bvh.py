@@ -57,15 +57,15 @@ def read(content: bytes, *, up: str | None = None, scale: float | None = None) -
         If it is no BVH file, is cut short, or does not show which way is up.
     """
     if up is not None and up not in UPWARD:
-        raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}")
+        raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}", "unknown_axis", up=up)
     head, found, tail = content.decode("utf-8", errors="replace").partition("MOTION")
     if not found or "HIERARCHY" not in head:
-        raise InputError('this is no BVH file: it lacks "HIERARCHY" or "MOTION"')
+        raise InputError('this is no BVH file: it lacks "HIERARCHY" or "MOTION"', "wrong_format")
     try:
         joints = _joints(head.split())
         rate, values = _motion(tail, sum(len(joint.channels) for joint in joints))
     except (ValueError, IndexError) as error:
-        raise InputError(f"the BVH file is damaged ({error}): export it again") from error
+        raise InputError(f"the BVH file is damaged ({error}): export it again", "damaged_file", format="BVH") from error
     skeleton = _skeleton(joints, rate, values)
     turn = UPWARD[up or _upward(skeleton)]
     size = extent(np.array([bone.head for bone in skeleton.bones]), np.eye(4))
@@ -121,7 +121,8 @@ def _motion(text: str, channels: int) -> tuple[float, Array]:
     if count < 1 or len(values) < count * channels or not np.isfinite(values).all():
         raise InputError(
             f"the BVH file is cut short: {count} frames of {channels} numbers should follow, {len(values)} numbers do; "
-            "copy or export it again"
+            "copy or export it again",
+            "cut_short",
         )
     return float(f"{1 / step:.6g}"), values[: count * channels].reshape(count, channels)
 
@@ -193,7 +194,7 @@ def _upward(skeleton: Skeleton) -> str:
         mapping is None
         or not {f"{joint}_{side}" for joint in ("hip", "ankle") for side in "lr"} <= mapping.joints.keys()
     ):
-        raise InputError("the BVH file has no bones whose names say that they are legs: give its upward axis as up")
+        raise InputError("no bones of the BVH file are called legs: give its upward axis as up", "unknown_axis")
     above = np.median(middle("hip") - middle("ankle"), axis=0)
     axis = int(np.argmax(np.abs(above)))
     return ("" if above[axis] > 0 else "-") + "XYZ"[axis]

@@ -22,6 +22,7 @@ from .plates import plates_on_feet
 from .plots import plot_loads
 from .prints import Ground, Prints, press, snow
 from .readers import read_amass, read_bvh, read_c3d, read_trc
+from .scoring import plates_saw_everything
 from .tables import to_csv, to_opensim
 from .validation import read_trials, table, validate
 
@@ -96,10 +97,11 @@ def _forces(options: argparse.Namespace) -> None:
             print(_contact(loads, sole, start, end))
     if measured is not None:
         error = np.stack([sole.force for sole in loads.soles], axis=1) - measured
-        seen = measured[..., 2].any(axis=1)
+        touching = loads.steps.contacts.touching[loads.steps.motion.on_frames]
+        seen = plates_saw_everything(measured[..., 2], touching, weight=loads.body.mass * GRAVITY, rate=loads.body.rate)
         if seen.any():
             rms = np.sqrt((error[seen, :, 2] ** 2).mean()) / (loads.body.mass * GRAVITY)
-            print(f"against the plates, where they are loaded: {rms:.3f} body weights for each foot")
+            print(f"against the plates, where they show all that bears: {rms:.3f} body weights for each foot")
     if options.csv:
         print(to_csv(loads, options.csv))
     for path in to_opensim(loads, options.opensim) if options.opensim else ():
@@ -163,7 +165,7 @@ def _loads(options: argparse.Namespace) -> Loads:
     """The loads of the body in the file; prints who it is."""
     suffix = options.file.suffix.lower()
     if suffix not in READERS:
-        raise InputError(f"'{options.file}' is no motion that is read here: give a file of {', '.join(READERS)}")
+        raise InputError(f"'{options.file}' is not read here: give a file of {', '.join(READERS)}", "wrong_format")
     body = READERS[suffix](options.file, mass=options.mass)
     source = "" if body.mass_from == "given" else f" (by {body.mass_from})"
     print(f"{body.name}: {body.mass:g} kg{source}, {len(body.times)} frames at {body.rate:g} Hz")
@@ -172,7 +174,8 @@ def _loads(options: argparse.Namespace) -> Loads:
         lowest = min(float(sole.lowest().min()) for sole in body.motion.soles)
         raise InputError(
             f"no sole of {body.name} touches the ground at {options.level:g} m; the lowest comes to {lowest:.3g} m: "
-            "give the height of the ground as --level, or longer motion"
+            "give the height of the ground as --level, or longer motion",
+            "no_contact",
         )
     return loads
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,4 +127,4 @@ def estimate_loads(body: Body, terrain: float | Terrain = 0.0) -> Loads:
 
 def as_terrain(terrain: float | Terrain) -> Terrain:
     """A terrain; level at a height [m] that is given alone."""
-    return FlatTerrain(float(terrain)) if isinstance(terrain, int | float) else terrain
+    return FlatTerrain(float(terrain)) if isinstance(terrain, SupportsFloat) else terrain

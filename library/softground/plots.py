@@ -50,12 +50,12 @@ def plot_loads(loads: Loads, path: Path, measured: Array | None = None) -> None:
         try:
             figure.savefig(partial, dpi=110)
         except ValueError as error:
-            raise InputError(f"'{path}' cannot be drawn ({error}): let its name end in .png") from error
+            raise InputError(f"'{path}' cannot be drawn ({error}): call it .png", "not_writable", path=path) from error
 
 
 def _matplotlib() -> Any:
     try:
         import matplotlib.figure  # noqa: PLC0415  # it is not needed for anything else, and slow to load
     except ImportError:
-        raise InputError("plots need matplotlib: pip install matplotlib") from None
+        raise InputError("plots need matplotlib: pip install matplotlib", "no_matplotlib") from None
     return matplotlib.figure

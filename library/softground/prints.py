@@ -161,12 +161,10 @@ def snow(hardness: float | str, layer_depth: float | None = None) -> GroundMater
     if isinstance(hardness, str):
         name = hardness.strip().lower().replace("-", " ").replace("_", " ")
         if name not in HARDNESSES:
-            raise InputError(
-                f"there is no hardness {hardness!r}: give {', '.join(HARDNESSES)}, or a number from 1 to 5"
-            )
+            raise InputError(f"no hardness {hardness!r}: give {', '.join(HARDNESSES)}, or 1 to 5", "hardness")
         hardness = HARDNESSES[name]
     if not 1.0 <= hardness <= 5.0 or (layer_depth is not None and not layer_depth > 0):
-        raise InputError("the hardness of snow is a number from 1 (fist) to 5 (knife), and its depth is positive")
+        raise InputError("the hardness of snow is from 1 (fist) to 5 (knife), and its depth positive", "hardness")
     return field_tests.snow(hardness, layer_depth)
 
 
@@ -218,7 +216,7 @@ def press(
     """
     terrain = as_terrain(ground.terrain)
     if terrain is not loads.terrain and _level(terrain) != _level(loads.terrain):
-        raise InputError("the ground's terrain is another one than that of the loads: estimate the loads on it")
+        raise InputError("the ground's terrain is another one than the loads': estimate them on it", "other_terrain")
     motion = loads.steps.motion
     size = shortest_sole([motion]) / CELLS_ALONG_SOLE if cell_size is None else cell_size
     soft = SoftGround(loads.terrain, ground.material, ground.pressure)

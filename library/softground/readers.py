@@ -121,7 +121,9 @@ def content_of(path: PathLike) -> bytes:
     try:
         return files.read_regular(Path(path), LARGEST)
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read ({error.strerror}): choose another file") from error
+        raise InputError(
+            f"'{path}' cannot be read ({error.strerror}): choose another file", "unreadable_file", path=Path(path)
+        ) from error
 
 
 def c3d_mass(content: bytes) -> float | None:
@@ -133,7 +135,7 @@ def c3d_mass(content: bytes) -> float | None:
 
 def _marked(path: PathLike, capture: Capture, mass: float | None, up: str | None) -> Body:
     if up is not None and up not in UPWARD:
-        raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}")
+        raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}", "unknown_axis", up=up)
     return _captured(path, captured_body(capture, up), mass)
 
 

@@ -50,7 +50,7 @@ def plates_of(file: Path, start: float) -> tuple[Plate, ...]:
     time, values = rows[:, 0], dict(zip(labels, rows.T, strict=True))
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     if not step > 0:
-        raise InputError(f"{file} has no times that grow: export it again")
+        raise InputError(f"{file} has no times that grow: export it again", "damaged_file")
     at = start + step * np.arange(max(int((time[-1] - start) / step + 1.5), 1))
     at = np.where(at > time[0] - step / 2, np.clip(at, time[0], time[-1]), at)  # times are rounded
     plates = []
@@ -84,9 +84,9 @@ def _table(file: Path) -> tuple[list[str], Array]:
     try:
         rows = np.array(lines[1:], dtype=float)
     except (IndexError, ValueError) as error:
-        raise InputError(f"{file} is no table of OpenSim ({error}): export it again") from error
+        raise InputError(f"{file} is no table of OpenSim ({error}): export it again", "wrong_format") from error
     if not len(rows) or rows.shape[1:] != (len(lines[0]),):
-        raise InputError(f"{file} is no table of OpenSim: its rows and labels do not match")
+        raise InputError(f"{file} is no table of OpenSim: its rows and labels do not match", "wrong_format")
     return lines[0], np.nan_to_num(rows)
 
 

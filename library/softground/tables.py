@@ -41,7 +41,7 @@ def to_opensim(loads: Loads, path: str | os.PathLike[str]) -> list[Path]:
     """
     target = Path(path)
     if target.suffix.lower() not in (".mot", ".sto"):
-        raise InputError(f"'{target}' is no OpenSim file: let its name end in .mot or .sto")
+        raise InputError(f"'{target}' is no OpenSim file: let its name end in .mot or .sto", "wrong_format")
     feet = [
         opensim.FootForce(sole.name, sole.side, sole.force, sole.centre_of_pressure, np.nan_to_num(sole.free_moment))
         for sole in loads.soles

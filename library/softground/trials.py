@@ -86,7 +86,7 @@ def read_trial(csv: Path) -> Trial:
     try:
         return _of_table(csv, about, np.genfromtxt(csv, delimiter=",", names=True))
     except (OSError, KeyError, ValueError) as error:
-        raise InputError(f"{csv} is no trial ({error}): it needs <joint>_<x|y|z> and grf_<l|r>_<x|y|z>") from error
+        raise InputError(f"{csv} ({error}) needs <joint>_<x|y|z> and grf_<l|r>_<x|y|z>", "wrong_format") from error
 
 
 def _of_table(csv: Path, about: Mapping[str, Any], table: NDArray[Any]) -> Trial:
@@ -118,7 +118,7 @@ def read_marked(path: Path) -> Trial:
     about = path.with_suffix(".json")
     mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content) if is_c3d else None
     if mass is None:
-        raise InputError(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
+        raise InputError(f'{path} does not say what its subject weighs: write {{"mass_kg": ...}} to {about}', "no_mass")
     captured = captured_body(c3d.read(content)) if is_c3d else captured_body(trc.read(content), "Y")
     table = None if is_c3d else forces_beside(path)
     plates = plates_of(table, first_time(content)) if table else captured.plates
@@ -143,7 +143,9 @@ def _about(path: Path) -> dict[str, Any]:
         return {**about, "mass_kg": float(about["mass_kg"])}
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise InputError(
-            f'{path} cannot be read ({error}): it must be a table such as {{"mass_kg": 70, "rate_hz": 100}}'
+            f'{path} cannot be read ({error}): it must be a table such as {{"mass_kg": 70, "rate_hz": 100}}',
+            "unreadable_file",
+            path=path,
         ) from error
 
 

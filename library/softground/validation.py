@@ -102,7 +102,8 @@ def read_trials(directory: Path) -> list[Trial]:
     if not trials:
         raise InputError(
             f"{directory} holds no trial: give a folder of C3D files, of TRC files with forces as NAME_grf.mot, or of "
-            "NAME.csv, .json and .bvh files"
+            "NAME.csv, .json and .bvh files",
+            "no_trials",
         )
     return trials
 
@@ -123,7 +124,7 @@ def validate(trial: Trial) -> Iterator[dict[str, object]]:
 def scored_frames(trial: Trial, body: Body) -> NDArray[np.bool_]:
     """Frames of a trial at which the plates show all that bears its body, (F,)."""
     if len(body.times) != len(trial.forces):
-        raise InputError(f"{trial.name}: its {len(body.times)} frames and {len(trial.forces)} forces do not match")
+        raise InputError(f"{trial.name}: {len(body.times)} frames, {len(trial.forces)} forces", "frames_differ")
     touching = detect_contacts(body.motion, FlatTerrain()).touching
     weight = trial.mass * GRAVITY
     return plates_saw_everything(trial.forces[..., 2], touching, weight=weight, rate=trial.rate)

@@ -13,6 +13,7 @@ from ..core.errors import SoftGroundError
 from . import settings
 from .characters import character_setup
 from .ground import baked_ground
+from .remedies import said
 from .translation import translated
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
@@ -26,7 +27,7 @@ def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -
         try:
             return execute(self, context)
         except SoftGroundError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, said(error))
             return {"CANCELLED"}
 
     return guarded

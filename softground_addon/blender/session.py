@@ -15,8 +15,8 @@ from ..core.record.footprints import Footprint
 from .state import state
 from .translation import CONTEXT
 
-PANEL_AREAS = ("VIEW_3D",)
-"""Editors that show the add-on's panels and overlay."""
+PANELS = {"VIEW_3D": "UI", "PROPERTIES": "WINDOW"}
+"""Editors that show the add-on's panels, each with the region that has them."""
 
 
 def _is_baking(_session: SoftGroundSession) -> bool:
@@ -155,10 +155,10 @@ def is_rendering() -> bool:
 
 
 def redraw(*, region_type: str = "UI") -> None:
-    """Have the regions of one type drawn again in all editors that show something of the add-on."""
+    """Have all panels drawn again, or with "WINDOW" the viewports."""
+    shown = PANELS if region_type == "UI" else {"VIEW_3D": region_type}
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in PANEL_AREAS:
-                for region in area.regions:
-                    if region.type == region_type:
-                        region.tag_redraw()
+            for region in area.regions:
+                if region.type == shown.get(area.type):
+                    region.tag_redraw()

@@ -193,6 +193,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
+        carried=(typed(options.carried_amount), typed(options.carried_reach)),
         under=options.under,
         regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),
@@ -210,6 +211,11 @@ def _calm(options: Any, units: SceneUnits) -> FeltWeather:
 def is_prop(character: Any) -> bool:
     """True if an entry of the characters is of objects without a rig."""
     return not (character.armature or character.body) and any(sole.object for sole in character.soles)
+
+
+def body_of(character: Any) -> bpy.types.Object | None:
+    """The object that stands for a character: its armature, its body, or the prop itself."""
+    return character.armature or character.body or next((sole.object for sole in character.soles if sole.object), None)
 
 
 def is_set_up(character: Any) -> bool:

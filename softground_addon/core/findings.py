@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from .errors import joined
 
 Severity = Literal["error", "warning", "note"]
 """Prints are wrong; prints may be wrong; prints are right, and something else is worth knowing. Worst first."""
@@ -24,13 +26,16 @@ class Finding:
     message : str
         What is wrong.
     remedy : str
-        What to do.
+        What to do; of those of the core, in words of no panel.
+    facts : mapping
+        What it is about, for programs, in SI units.
     """
 
     code: str
     severity: Severity
     message: str
     remedy: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -41,9 +46,9 @@ class Finding:
         >>> Finding("code", "note", "It is small", "make it larger.").text
         'It is small: make it larger.'
         """
-        return f"{self.message}{' ' if self.message.endswith('.') else ': '}{self.remedy}"
+        return joined(self.message, self.remedy)
 
-    def as_dict(self) -> dict[str, str]:
+    def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
 

@@ -25,9 +25,6 @@ from .weather.felt_weather import FeltWeather
 
 DOWN = (0.0, 0.0, -1.0)
 
-TIME_LIMIT = "Time Limit in Advanced > Mesh and Look, or --set longest_bake=N"
-"""By what the user sets `BakeSettings.longest_bake_s`."""
-
 
 class Acts(IntEnum):
     """First stage that a setting acts on, in the order of a bake: a later one leaves what came before as it is."""
@@ -178,6 +175,8 @@ class BakeSettings(SceneUnits):
         What wets each of the `hard_grounds`, empty of a dry one; none if all are dry.
     marks : bool
         True if soles leave on hard ground what sticks to them.
+    carried : (float, float)
+        How much sticks to soles, and how far they carry it, over what is usual.
     carve : bool
         True if bodies carve deep ground where their feet are let down.
     regions : tuple of RegionSettings
@@ -222,6 +221,7 @@ class BakeSettings(SceneUnits):
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
     wet_grounds: tuple[str, ...] = field(default=(), metadata={**UNSAID, **_on(Acts.RESPONDING)})
     marks: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
+    carried: tuple[float, float] = field(default=(1.0, 1.0), metadata={**UNSAID, **_on(Acts.RESPONDING)})
     carve: bool = field(default=True, metadata={**UNSAID, **_on(Acts.RESPONDING)})
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
     gravity_direction: tuple[float, float, float] = field(default=DOWN, metadata=UNSAID)

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.benchmarks import bars
+
 
 @pytest.fixture
 def scene():
@@ -13,3 +15,11 @@ def scene():
     yield bpy.context.scene
     bpy.ops.wm.read_factory_settings(use_empty=True)
     softground_addon.unregister()
+
+
+def pytest_terminal_summary(terminalreporter):
+    """The table of what was measured."""
+    if bars.ROWS:
+        terminalreporter.section("measured, and the most that it may be")
+        for line in bars.table():
+            terminalreporter.write_line(line)

@@ -9,6 +9,7 @@ from softground_addon.blender import jobs, reuse
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from tests.benchmarks.bars import below
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
 
@@ -67,9 +68,7 @@ def test_a_whole_bake_costs_at_most_twice_the_bare_frames_plus_the_simulation(sc
             stages[progress.stage] += now - before
             before = now
         ratios.append((stages["sample"] + stages["write"]) / bare)
-        each = ", ".join(f"{stage} {seconds / FRAMES * 1e3:.2f}" for stage, seconds in stages.items())
-        print(f"\n{FRAMES} frames; ms per frame: {each}, bare {bare / FRAMES * 1e3:.2f}; ratio {ratios[-1]:.2f}")
-    assert min(ratios) < 2.0
+    below(f"a bake over bare frames, {character.__name__.replace('_', ' ')}", min(ratios), 2.0)
 
 
 def test_keys_are_read_in_half_the_time_in_which_they_are_evaluated(scene):
@@ -86,8 +85,7 @@ def test_keys_are_read_in_half_the_time_in_which_they_are_evaluated(scene):
     read = min(milliseconds() for _ in range(5))
     armature.constraints.new("LIMIT_LOCATION")  # which does nothing, but is more than keys
     evaluated = min(milliseconds() for _ in range(5))
-    print(f"\nms per frame: read {read:.3f}, evaluated {evaluated:.3f}; ratio {read / evaluated:.2f}")
-    assert read < 0.5 * evaluated
+    below("reading of keys, over evaluating them", read / evaluated, 0.5)
 
 
 @pytest.mark.parametrize("preset", ["Snow", "Mud", "Dry Sand"])
@@ -103,12 +101,9 @@ def test_a_bake_under_weather_takes_at_most_a_tenth_longer(scene, preset):
                 bpy.ops.softground.add_weather()
             elif bpy.ops.softground.remove_weather.poll():
                 bpy.ops.softground.remove_weather()
-            started = time.process_time()
-            jobs.run(bake_job.bake(scene))
-            taken.append(time.process_time() - started)
+            taken.append(_anew(scene))
     without, with_weather = min(seconds[False]), min(seconds[True])
-    print(f"\n{preset}: {without:.2f} s, with weather {with_weather:.2f} s, {with_weather / without:.3f} times")
-    assert with_weather <= 1.1 * without
+    below(f"a bake under weather over one without, {preset}", with_weather / without, 1.1)
 
 
 def seconds_to_bake(scene):
@@ -127,12 +122,11 @@ def walk_in_snow(scene, frames):
     return seconds_to_bake(scene)
 
 
-@pytest.mark.parametrize("frames", [96, 800])
+@pytest.mark.parametrize("frames", [96, 400])
 def test_a_bake_on_the_ground_of_the_first_takes_little_longer(scene, frames):
     first = walk_in_snow(scene, frames)
     again = min(_anew(scene) for _ in range(3))
-    print(f"\n{frames} frames: first {first:.2f} s, on its ground {again:.2f} s, {again / first:.2f} times")
-    assert again < 1.5 * first
+    below(f"a bake on the ground of the first over the first, {frames} frames", again / first, 1.5)
 
 
 def _anew(scene):
@@ -143,7 +137,7 @@ def _anew(scene):
 @pytest.mark.parametrize(
     ("setting", "values", "share"),
     [
-        ("relief_strength", (0.8, 1.0), 0.65),
+        ("relief_strength", (0.8, 1.0), 0.4),
         ("relief", ("OFF", "FINE"), 0.65),
         ("pressure", ("UNIFORM", "CENTRE_OF_PRESSURE"), 0.95),
     ],
@@ -157,5 +151,4 @@ def test_a_bake_after_a_change_works_out_only_what_follows_from_it(scene, settin
             reuse.forget()
         took[bool(number % 2)].append(seconds_to_bake(scene))
     whole, again = min(took[True]), min(took[False][1:])
-    print(f"\n{setting}: whole {whole:.2f} s, again {again:.2f} s, {again / whole:.2f} times")
-    assert again < share * whole
+    below(f"a bake after a change of {setting} over a whole one", again / whole, share)

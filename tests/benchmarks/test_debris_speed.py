@@ -11,6 +11,7 @@ from softground_addon.blender.debris import debris_object
 from softground_addon.blender.nodes import node_modifiers
 from softground_addon.core.debris.debris import Debris
 from softground_addon.core.rig.recording import SceneUnits
+from tests.benchmarks.bars import below
 from tests.benchmarks.test_playback_speed import heavy_walker
 
 pytestmark = pytest.mark.benchmark
@@ -73,8 +74,6 @@ def test_debris_costs_little_beside_the_bare_frame_of_a_walk(scene, count, limit
     turns = [{name: played(scene, shown, (debris, each)) for name, shown in contestants.items()} for _ in range(TURNS)]
     least = {name: float(np.min([turn[name] for turn in turns], axis=0).mean()) for name in contestants}
     bare = least["bare"]
-    print(f"\n{count:,} pieces")
-    for name, value in least.items():
-        print(f"  {name:18s} {value:7.2f} ms, {value - bare:7.2f} ms more, {value / bare:5.2f} x bare")
-    assert least["debris"] - bare <= limit * bare
-    assert least["debris"] - bare <= 0.5 * (least["an instance each"] - bare)
+    more = least["debris"] - bare
+    below(f"a frame's {count:,} pieces of debris over the bare frame", more / bare, limit)
+    below(f"a frame's {count:,} pieces of debris over instances", more / (least["an instance each"] - bare), 0.5)

@@ -12,6 +12,7 @@ from softground_addon.core.loads.contact_timing import refine_contacts
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.forces import whole_body_forces
 from softground_addon.core.motion.motion import steps_per_frame
+from tests.benchmarks.bars import below
 from tests.core import spring_mass
 from tests.core.character import character, flat_sole
 from tests.core.spring_mass import LEG, motion_and_forces
@@ -49,5 +50,5 @@ def test_forces_for_a_thousand_frames(gait, rate):
         end = time.process_time()
         costs["contacts"] = min(costs["contacts"], (middle - start) * 1e3)
         costs["forces"] = min(costs["forces"], (end - middle) * 1e3)
-    print(f"\n{FRAMES} frames at {rate:.0f} fps: contacts {costs['contacts']:.1f} ms, forces {costs['forces']:.1f} ms")
-    assert costs["forces"] < LIMIT_MS
+    name = getattr(gait, "__name__", "run")
+    below(f"forces of {FRAMES} frames of a {name} at {rate:.0f} fps", costs["forces"], LIMIT_MS, "ms")

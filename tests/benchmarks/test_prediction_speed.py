@@ -9,6 +9,7 @@ from softground_addon.core.composers.prediction import matching_modulus, pressed
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from tests.benchmarks.bars import below
 from tests.core.walkers import walk
 
 SLICE = 25e-3
@@ -33,20 +34,15 @@ def slices_of(work):
 @pytest.mark.alone
 @pytest.mark.parametrize("count", VALUES)
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
-def test_a_depth_is_predicted_while_a_slider_moves(count, pressure, capsys):
+def test_a_depth_is_predicted_while_a_slider_moves(count, pressure):
     loads = [walk(steps=count - 2, heading=0.3)]
     ground = SoftGround(FlatTerrain(), SNOW, pressure)
-    first = slices_of(pressed_contacts.slices(loads, ground, 0.005))
     contacts = pressed_contacts(loads, ground, 0.005)
     typed = np.sum(slices_of(matching_modulus.slices(contacts, SNOW, 0.6 * contacts.typical, pressure)))
     materials = [GroundMaterial(0.25e6 * (1 + number / 10), 0.05, 0.2) for number in range(REPEATS)]
     values = [slices_of(typical_depth.slices(contacts, material, pressure)) for material in materials]
     value, slowest = (min(measure(value) for value in values) for measure in (np.sum, np.max))
-    with capsys.disabled():
-        print(
-            f"\n{count} contacts, {pressure}: all of them {first.sum():.2f} s, a value {value:.3f} s, "
-            f"a typed depth {typed:.3f} s, slices of at most {slowest * 1e3:.1f} ms"
-        )
-    assert value < VALUES[count]
-    assert typed < TYPED
-    assert slowest < SLICE
+    of = f"of {count} contacts, {pressure.replace('_', ' ').lower()}"
+    below(f"a predicted depth {of}", 1e3 * value, 1e3 * VALUES[count], "ms")
+    below(f"a typed depth {of}", 1e3 * typed, 1e3 * TYPED, "ms")
+    below(f"longest slice {of}", 1e3 * slowest, 1e3 * SLICE, "ms")

@@ -7,7 +7,9 @@ import doctest
 import inspect
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -181,6 +183,47 @@ def test_bones_of_a_bvh_go_where_its_turns_take_them(tmp_path):
     assert body.rate == pytest.approx(30.0, abs=1e-3)
 
 
+PAW = """ JOINT {side}{upper}
+ {{
+  OFFSET {x} -2 {z}
+  CHANNELS 3 Zrotation Xrotation Yrotation
+  JOINT {side}{lower}
+  {{
+   OFFSET 0 -18 2
+   CHANNELS 3 Zrotation Xrotation Yrotation
+   JOINT {side}{paw}
+   {{
+    OFFSET 0 -18 -2
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {{
+     OFFSET 0 -6 2
+    }}
+   }}
+  }}
+ }}"""
+
+
+def test_an_animal_of_a_bvh_stands_on_four_paws_and_wants_its_mass(tmp_path):
+    """Its weight is between them, and the paws nearer to its centre of mass, in front, bear more of it."""
+    legs = [("Left", 6), ("Right", -6)]
+    parts = [PAW.format(side=side, x=x, z=0, upper="UpLeg", lower="Leg", paw="Foot") for side, x in legs]
+    parts += [PAW.format(side=side, x=x, z=45, upper="Arm", lower="ForeArm", paw="Hand") for side, x in legs]
+    neck = " JOINT Neck\n {\n OFFSET 0 5 50\n CHANNELS 3 Zrotation Xrotation Yrotation\n"
+    neck += " End Site\n {\n OFFSET 0 12 10\n }\n }"
+    head, _, _ = (BVH % ("\n".join([*parts, neck]), 60, "")).partition(" JOINT Spine")
+    rows = "\n".join("0 44 0 " + "0 " * 42 for _ in range(60))
+    path = tmp_path / "dog.bvh"
+    path.write_text(f"{head}}}\nMOTION\nFrames: 60\nFrame Time: 0.0333333\n{rows}\n")
+    with pytest.raises(softground.InputError, match="nothing tells what 'dog' weighs"):
+        softground.read_bvh(path)
+    loads = softground.estimate_loads(softground.read_bvh(path, mass=25.0, scale=0.01))
+    bears = {sole.name: float(sole.force[30, 2]) for sole in loads.soles}
+    assert sum(bears.values()) == pytest.approx(25.0 * 9.81, rel=1e-6)
+    assert min(bears.values()) > 0.1 * 25.0 * 9.81
+    assert bears["hand.L"] + bears["hand.R"] > bears["foot.L"] + bears["foot.R"]
+
+
 def test_turns_of_a_bvh_follow_each_other_in_the_order_of_its_channels(tmp_path):
     """Z then X, of which X turns first: what points along x stays under X, and Z takes it to y (up)."""
     turned = softground.read_bvh(bvh(tmp_path, LeftArm=[90, 90, 0]), mass=MASS, scale=0.01).motion.joints
@@ -230,6 +273,25 @@ def test_the_softer_the_snow_the_deeper_a_boot(loads):
         depths.append(max(each.depth for each in softground.press(loads, ground, cell_size=0.02).prints))
     assert depths == sorted(depths, reverse=True)
     assert depths[0] > 5 * depths[-1]
+
+
+@pytest.mark.parametrize("height", [1, np.float32(1.0), np.int64(1), np.array(1.0)])
+def test_the_height_of_a_level_ground_is_any_number(height):
+    body = softground.Body.from_joints(standing(1.0, frames=3), RATE, mass=MASS)
+    assert softground.estimate_loads(body, height).soles[0].force[0, 2] == pytest.approx(WEIGHT / 2)
+
+
+def test_the_command_compares_with_plates_where_they_show_all_that_bears(loads, tmp_path, capsys, monkeypatch):
+    """On one plate of two that a body stands on, half of it is no error of the estimate."""
+    force = np.stack([sole.force for sole in loads.soles], axis=1)
+    shown = force.copy()
+    shown[30:, 1] = 0.0
+    monkeypatch.setattr(
+        "library.softground.cli._loads", lambda _: replace(loads, body=replace(loads.body, plates=(1,)))
+    )
+    monkeypatch.setattr("library.softground.cli.plates_on_feet", lambda _: SimpleNamespace(force=shown))
+    assert main(["forces", "anna.c3d"]) == 0
+    assert "bears: 0.000 body weights" in capsys.readouterr().out
 
 
 def test_progress_goes_from_nothing_to_all(loads):
@@ -294,6 +356,10 @@ def test_forces_of_plates_by_their_usual_names_are_turned_with_the_markers(tmp_p
     np.testing.assert_allclose(free_moment(plate)[7], 3.0, atol=1e-9)
 
 
+def scaled(factor):
+    return {name: path * factor for name, path in standing().items()}
+
+
 def refusals():
     line = {name: path[:, :2] for name, path in standing().items()}
     legless = {name: path for name, path in standing().items() if not name.startswith("knee")}
@@ -305,6 +371,9 @@ def refusals():
         "frame rate of 0 Hz": lambda: body(standing(), 0.0),
         "mass of 'body' is -1 kg": lambda: body(standing(), RATE, mass=-1.0),
         r"positions are of shape \(3, 3\)": lambda: meshes(np.eye(3), [[0, 1, 2]], RATE),
+        "1.67e\\+03 m large, as of a file in millimetres": lambda: body(scaled(1e3), RATE, mass=MASS),
+        "167 m large, as of a file in centimetres": lambda: body(scaled(1e2), RATE),
+        r"not numbers of the shape \(2, 3\)": lambda: body(standing(frames=0), RATE),
         "as one rigid piece": lambda: meshes(still, FACES, RATE),
         "hardness 'hand'": lambda: softground.snow("hand"),
         "from 1": lambda: softground.snow(7),

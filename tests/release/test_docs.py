@@ -13,8 +13,18 @@ from tests.release.test_platform_rules import TREES
 ROOT = Path(__file__).parents[2]
 SHOTS = sorted((ROOT / "docs" / "shots").glob("*.md"))
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *SHOTS]
-NOT_NAMES = ("What goes wrong most often.", "The ground.", "The animation.", "The events.", "−", "+", "N", "Add")
-"""In bold, but beginnings of paragraphs, signs and keys, or what a button says before a name."""
+NOT_NAMES = (
+    "What goes wrong most often.",
+    "The ground.",
+    "The animation.",
+    "The events.",
+    "−",
+    "+",
+    "N",
+    "Add",
+    "Physics",
+)
+"""In bold, but a tab of Blender's, beginnings of paragraphs, signs and keys, or what a button says before a name."""
 
 
 def text_of(page):

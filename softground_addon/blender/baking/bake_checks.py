@@ -104,7 +104,7 @@ def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_si
         raise InputError(
             f"Ground '{ground.name}' is too coarse: its vertices are more than "
             f"{COARSEST_SPACING * sole_length * 100:.0f} cm apart under soles of {sole_length * 100:.0f} cm. "
-            "Set Detail to Automatic in Advanced > Mesh and Look, or Subdivide the ground."
+            "Set Detail to Automatic in Properties > Physics > Mesh and Look, or Subdivide the ground."
         )
     return False
 
@@ -119,7 +119,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
                 "coarse_ground",
                 "warning",
                 f"Prints lie where ground '{ground.name}' is too coarse to show them",
-                "set Detail to Automatic in Advanced > Mesh and Look, or create the ground again.",
+                "set Detail to Automatic in Properties > Physics > Mesh and Look, or create the ground again.",
             )
         ]
     return [

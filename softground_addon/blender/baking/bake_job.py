@@ -40,6 +40,7 @@ from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of, read_shot, settings_of
+from ..remedies import worded
 from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
@@ -119,6 +120,7 @@ def bake(
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
     findings = [*prints.findings, *said, *edit_findings(record), *response_job.keyed_responses(wanted)]
     of_responses = response_findings(prints.responses)
+    rows = as_edited(happened, record.steps, record.laid_carves)
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -129,7 +131,7 @@ def bake(
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=as_edited(happened, record.steps, record.laid_carves),
+        events=marks.floors.with_films(rows, record.steps) if marks else rows,
         carried_kg=vars(marks.carried) if marks else None,
     )
     sole_length = shortest_sole(shot.motions)
@@ -156,7 +158,7 @@ def bake(
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=published.error if published else None,
-        findings=[*findings, *of_responses, *refused],
+        findings=worded([*findings, *of_responses, *refused]),
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):

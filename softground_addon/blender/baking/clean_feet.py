@@ -142,8 +142,8 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
     legs = leg_soles(motion)
     if not legs:
         raise InputError(
-            f"'{motion.name}' has no leg with hip, knee and foot to clean: complete its joints in Advanced > Body "
-            "Bones. A leg needs two bones at least, and a foot: a bone of its own, or the end of the shin."
+            f"'{motion.name}' has no leg with hip, knee and foot to clean: complete its joints in Properties > "
+            "Physics > Body Bones. A leg needs two bones at least, and a foot: a bone of its own, or the shin's end."
         )
     parts = {control.part for control in rig.controls}
     if not all({f"shank_{side}", f"foot_{side}"} & parts for side in legs):

@@ -10,7 +10,7 @@ from functools import partial
 import bpy
 
 from ...core.carried.marks import Marks, marks_of
-from ...core.composers.relief_plan import BARS, relief_at, shod_of
+from ...core.composers.relief_plan import BARS, FLESH, relief_at, shod_of
 from ...core.debris.debris import Debris, shed_volumes
 from ...core.debris.thrown_debris import thrown
 from ...core.ground.heightfield import Terrain
@@ -20,6 +20,7 @@ from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.plants.tramplings import Tramplings, tramplings
 from ...core.playback.playback_curves import playback_curves_at
+from ...core.playback.vertex_histories import Movements
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.record import BakeRecord, dump
@@ -34,6 +35,7 @@ from ..jobs import Job, Progress, meanwhile
 from ..plants import trampling_table
 from ..playback import display_key, playback
 from ..reading import staleness
+from ..reuse import reused
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ def marks_of_record(
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
         return None
-    shod = shod_of(made_with.inputs(), record.footprints) if made_with.tread_m > 0 else ()
+    is_bare = made_with.tread_pattern == FLESH
+    feet = shod_of(made_with.inputs(), record.footprints) if made_with.tread_m > 0 or is_bare else ()
     return (
         yield from marks_of.slices(
             loads,
@@ -92,7 +95,9 @@ def marks_of_record(
             terrain,
             surface=made_with.surface,
             shed=shed_volumes(debris) if debris is not None else {},
-            treads=dict.fromkeys(shod, made_with.tread_m),
+            treads={} if is_bare else dict.fromkeys(feet, made_with.tread_m),
+            bare=feet if is_bare else (),
+            carried=made_with.carried,
             brought={character.name: character.dirty_soles for character in made_with.characters},
         )
     )
@@ -113,9 +118,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)
     sample = yield from meanwhile(Progress("write", 0.25), sample_at.slices(footprints, x, y, **moment))
-    sigma, inputs = made_with.material.blur_sigma, made_with.inputs()
-    relief_of = relief_at.slices(footprints, x, y, inputs, blur_sigma=sigma)
-    relief = yield from meanwhile(Progress("write", 0.3), relief_of)
+    relief, known = yield from _shown_by(footprints, x, y, made_with)
     if relief:
         sample = sample.with_relief(*all_together(relief, len(x)).T)
     over_time = playback_curves_at.slices(
@@ -126,6 +129,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
         frame_rate=made_with.frame_rate,
         time_stretch=made_with.time_stretch,  # nodes count the animation's frames
         relief=relief,
+        known=known,
     )
     spans, lines = yield from meanwhile(Progress("write", 0.6), over_time)
     points = yield from meanwhile(Progress("write", 0.9), lines.position.unpacking())
@@ -160,6 +164,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
             marks,
             stored,
             relief,
+            known,
         )  # all is in the mesh, of which Blender makes another
         if is_draft:
             yield Progress("write", 0.95)
@@ -172,6 +177,32 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
     return Published(ground, shown, error)
+
+
+def _shown_by(
+    footprints: Sequence[Footprint], x: Array, y: Array, made_with: BakeSettings
+) -> Job[tuple[list[StepRelief], list[Movements]]]:
+    """Relief of footprints at places, and what is known of their movements there.
+
+    Both are held with the footprints, which are compared by their identity: those of a bake never change.
+    """
+    shown, sigma, inputs = Progress("write", 0.3), made_with.material.blur_sigma, made_with.inputs()
+    compared, strength = (tuple(map(id, footprints)), x, y, sigma), inputs.pop("relief_strength")
+
+    def relief_of() -> Job[tuple[Sequence[Footprint], list[StepRelief]]]:
+        full = {**inputs, "relief_strength": 1.0}
+        work = relief_at.slices(footprints, x, y, full, blur_sigma=sigma)
+        return footprints, (yield from meanwhile(shown, work))
+
+    def movements_of() -> Job[tuple[Sequence[Footprint], list[Movements]]]:
+        yield shown
+        return footprints, []
+
+    _, known = yield from reused(shown, "movements", compared, movements_of())
+    if not strength > 0:
+        return [], known
+    _, relief = yield from reused(shown, "relief", (compared, inputs), relief_of())
+    return [step.scaled(strength) for step in relief], known
 
 
 def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:

@@ -24,6 +24,7 @@ from ..rigs.frame_ranges import ancestors, playing_tracks
 from ..sampling.body_sampling import deforms, meshes_of
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.sampling_scene import object_named
+from ..settings import find
 
 UPRIGHT = 0.9998
 """Gravity whose downward part is less than this points elsewhere (1°)."""
@@ -50,6 +51,7 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         ),
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
+        *_unseen_ground(scene, wanted),
         *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
 
@@ -210,3 +212,15 @@ def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())
     ]
+
+
+def _unseen_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+    """A ground that is in another scene, or in none, so that its prints are seen there alone."""
+    ground = find(wanted.ground) if wanted.ground else None
+    if ground is not None and ground.name not in scene.objects and not instancers(scene, [ground]):
+        yield Finding(
+            "unseen_ground",
+            "warning",
+            f"Ground '{ground.name}' is not in scene '{scene.name}', where its prints are not seen",
+            "link it there (Object > Link/Transfer Data > Link Objects to Scene), or choose another one.",
+        )

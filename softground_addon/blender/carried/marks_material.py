@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ...core.ground.surfaces import Liquid, SurfaceRecord
+from ...core.relief.tread import LENGTH, PADS
 from ..compat import shader_tree
 from ..nodes.shader_graph import Graph, Socket
 from . import marks_nodes as nodes
@@ -66,7 +67,25 @@ def _amount(graph: Graph, surface: SurfaceRecord | Liquid) -> tuple[Socket, Sock
     patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.55, 1.3)
     amount = full * lug * patches + (coarse * 1.7 + fine * 0.9) * graph.ramp(full, 0.0, 0.5)
     ragged = distance + coarse * 0.010 + fine * 0.004
-    return amount, graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
+    edge = graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
+    return amount, edge * _pads(graph, coarse * 0.006 + fine * 0.003)
+
+
+def _pads(graph: Graph, uneven: Socket) -> Socket:
+    """1 under heel, ball and toes of a bare foot, 0 under its arch and between its toes; 1 under other soles."""
+    place = graph.out(graph.node("ShaderNodeAttribute", attribute_name=nodes.PAD), 1)
+    separate = graph.node("ShaderNodeSeparateXYZ", {0: place})
+    is_bare = graph.math("GREATER_THAN", graph.out(separate, 2), 0.0)
+    level = graph.out(graph.node("ShaderNodeVectorMath", {0: place, 1: (1.0, 1.0, 0.0)}, operation="MULTIPLY"))
+    inside = uneven
+    for number, (ahead, left, half_length, half_breadth) in enumerate(PADS):
+        offset = graph.node("ShaderNodeVectorMath", {0: level, 1: (ahead, left, 0.0)}, operation="SUBTRACT")
+        size = {0: graph.out(offset), 1: (half_length, half_breadth, 1.0)}
+        share = graph.node("ShaderNodeVectorMath", size, operation="DIVIDE")
+        share = graph.out(graph.node("ShaderNodeVectorMath", {0: graph.out(share)}, operation="LENGTH"), 1)
+        within = graph.math("SUBTRACT", 1.0, share) * (half_length * LENGTH) + uneven
+        inside = graph.math("MAXIMUM", inside, within) if number else within
+    return graph.blend(is_bare, 1.0, graph.ramp(inside, -0.001, 0.003))
 
 
 def _earth(

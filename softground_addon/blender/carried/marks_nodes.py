@@ -1,16 +1,14 @@
 """The node group that plays marks: those to come are hidden, those that lie there dry, and snow melts.
 
-It is native Blender data and needs nothing of this add-on; the laws are those of `core.weather.weather`.
+It is native Blender data and needs nothing of this add-on; the law is that of `core.carried.ageing`.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
+from ...core.carried.ageing import aged
 from ...core.ground.surfaces import Liquid, SurfaceRecord
-from ...core.weather import weather
 from ..nodes.node_graph import NodeGraph
 from ..nodes.node_modifiers import GroupInput, new_group
 
@@ -25,6 +23,8 @@ BIRTH, MASS, KIND, WETNESS, SOLE, STEP = "birth", "mass", "kind", "wetness", "so
 place along and across the sole and distance to its outline [m], number of the contact."""
 TREAD = "tread"
 """Depth of the grooves of the sole [m], 0 of bare feet."""
+PAD = "pad"
+"""Of bare feet alone, a vector; see `core.carried.marks.Marks`."""
 SHARE, ZONE = "share", "zone"
 """Share of the film on the sole that is left there, and zone of the sole: for steps that are edited."""
 NOTHING = -1.0
@@ -46,11 +46,6 @@ INPUTS = (
     GroupInput("Time Scale", 1.0, "How many times faster than the animation marks dry and melt", (0.0, 1e7)),
 )
 """Sliders; only snow has a temperature."""
-WASH_OFF = 0.18
-"""Share that a millimetre of rain washes off paved ground, of what is there [1/mm]: 90 % by half an inch (J. D. Sartor
-and G. B. Boyd, EPA-R2-72-081, 1972, as in the Storm Water Management Model)."""
-MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
-"""In metres per second."""
 
 
 def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
@@ -63,17 +58,10 @@ def build(surface: SurfaceRecord | Liquid, *, frame_rate: float) -> Any:
     age = (graph.number(graph.frame()) - graph.number(graph.attribute(BIRTH))) / frame_rate
     is_none = graph.compare("LESS_THAN", graph.attribute(MASS), 0.0)
     geometry = graph.without(geometry, graph.either(graph.compare("LESS_THAN", age.socket, 0.0), is_none))
-    passed = age * sliders["Time Scale"]
-    water = graph.number(graph.attribute(MASS)) * (surface.carried.water / weather.WATER_DENSITY)
-    if surface.melts:
-        rate = weather.melting_rate(sliders["Temperature"])
-        melted = (passed * rate / water).within_one()
-        geometry = graph.store(geometry, MELTED, melted.socket, True)
-        passed = np.maximum(passed - water / rate, 0.0) * rate.above(0.0)
-    lost = passed * (sliders["Drying"] - sliders["Rain"]).at_least(0.0) * MILLIMETRES_PER_HOUR
-    wet = weather.wetness(lost / water * weather.SURFACE_FILM)
-    geometry = graph.store(geometry, WETNESS, wet.socket, True)
-    fallen = age * sliders["Time Scale"] * sliders["Rain"] * (MILLIMETRES_PER_HOUR * 1e3)
-    remains = graph.number(graph.attribute(MASS)) * (fallen * -WASH_OFF).exp()
-    graph.finish(graph.store(geometry, MASS, remains.socket, True))
+    mass, passed = graph.number(graph.attribute(MASS)), age * sliders["Time Scale"]
+    now = aged(mass, passed, surface, sliders["Drying"], sliders["Rain"], sliders.get("Temperature"))
+    melted = {MELTED: now.melted} if surface.melts else {}
+    for name, value in (melted | {WETNESS: now.wetness, MASS: now.mass}).items():
+        geometry = graph.store(geometry, name, value.socket, True)
+    graph.finish(geometry)
     return graph.tree

@@ -74,11 +74,10 @@ def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mappin
     """
     obj = of(ground)
     mesh: Any = obj and obj.data
-    names = (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS)
-    if mesh is None or mesh.get(FLOORS) is None or not {*names} <= {*mesh.attributes.keys()}:
-        return  # of an earlier bake, or the user's by now
-    share, zone, step, before = (_values(mesh, name) for name in names)
-    films, _ = _floors(mesh[FLOORS]).films(steps, shed)
+    if obj is None or not has_numbers(obj):
+        return
+    share, zone, step, before = (values(mesh, name) for name in (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS))
+    films, _ = floors_of(obj).films(steps, shed)
     each = np.array([films[number] for number in range(len(films))])
     mass = _or_nothing(each[step.astype(int), zone.astype(int)] * share, step.astype(int))
     place = mesh_arrays.positions(mesh)
@@ -88,11 +87,25 @@ def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mappin
     mesh.update()
 
 
-def _values(mesh: Any, name: str) -> NDArray[np.float64]:
+def values(mesh: Any, name: str) -> NDArray[np.float64]:
+    """One of the attributes of a mesh of marks, as numbers."""
     attribute = mesh.attributes[name].data
-    values = np.empty(len(attribute), np.float32 if mesh.attributes[name].data_type == "FLOAT" else np.int32)
-    attribute.foreach_get("value", values)
-    return values.astype(float)
+    numbers = np.empty(len(attribute), np.float32 if mesh.attributes[name].data_type == "FLOAT" else np.int32)
+    attribute.foreach_get("value", numbers)
+    return numbers.astype(float)
+
+
+def floors_of(obj: bpy.types.Object) -> FloorSteps:
+    """Steps on hard floors from which marks follow."""
+    mesh: Any = obj.data
+    return _floors(mesh[FLOORS])
+
+
+def has_numbers(obj: bpy.types.Object) -> bool:
+    """True of marks whose numbers are all there: not of an earlier bake, nor changed by the user."""
+    mesh: Any = obj.data
+    names = {nodes.BIRTH, nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS}
+    return mesh.get(FLOORS) is not None and names <= {*mesh.attributes.keys()}
 
 
 def _or_nothing(mass: NDArray[np.float64], step: NDArray[Any]) -> NDArray[np.float64]:
@@ -116,7 +129,7 @@ def _floors(text: str) -> FloorSteps:
         )
         fixed = {"of": tuple(sole["of"]), "areas": np.array(sole["areas"]), "meetings": meetings}
         soles.append(SoleOnFloors(**{**sole, **fixed}))
-    return FloorSteps(said["kind"], said["ground"], tuple(soles))
+    return FloorSteps(said["kind"], said["ground"], tuple(soles), tuple(said.get("scaled", (1.0, 1.0))))
 
 
 def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
@@ -164,14 +177,21 @@ def _play(modifier: Any, group: Any) -> None:
     """Have marks play a group, with what the artist has set."""
     if modifier.node_group == group:
         return
-    values = {name: value for name, value, *_ in nodes.INPUTS}
-    if modifier.node_group:
-        set_values = {
-            name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items() if name in values
-        }
-        values |= {name: value for name, value in set_values.items() if value is not None}
+    chosen = _sliders(modifier)
     modifier.node_group = group
-    set_inputs(modifier, values)
+    set_inputs(modifier, chosen)
+
+
+def sliders_of(obj: bpy.types.Object) -> dict[str, float]:
+    """Values of the sliders of marks by name, those at first where the artist has none."""
+    return _sliders(_modifier_of(obj))
+
+
+def _sliders(modifier: Any) -> dict[str, float]:
+    inputs = inputs_of(modifier) if modifier and modifier.node_group else {}
+    chosen = {name: compat.read_input(modifier, inputs[name]) for name, *_ in nodes.INPUTS if name in inputs}
+    first = {name: value for name, value, *_ in nodes.INPUTS}
+    return first | {name: value for name, value in chosen.items() if value is not None}
 
 
 def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
@@ -194,7 +214,8 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
         (nodes.STEP, "INT", marks.step),
         (nodes.SOLE, "FLOAT_VECTOR", marks.sole),
     )
-    mesh = mesh_arrays.points(NAME, place - origin, columns)
+    pads = ((nodes.PAD, "FLOAT_VECTOR", marks.pad),) if marks.pad.any() else ()
+    mesh = mesh_arrays.points(NAME, place - origin, (*columns, *pads))
     mesh[ORIGIN], mesh[FLOORS] = origin.tolist(), _text(marks.floors)
     mesh[THICKNESS] = 1.0 / record.density / unit_scale
     mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)

@@ -54,7 +54,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     settings = scene.softground
     if any(character.armature == armature for character in settings.characters):
         raise InputError(
-            f"'{armature.name}' is already a character: correct its bones in Advanced, or remove it first."
+            f"'{armature.name}' is already a character: correct its bones in Properties > Physics, or remove it first."
         )
     rig = name_of(armature)
     recognised = yield from recognise(scene, armature, animated_frames(scene, armature))

@@ -27,6 +27,7 @@ from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
 from ..output import export_formats
 from ..preset_files import user_folder
+from ..remedies import said
 from ..response import response_job
 from . import cli_arguments, program
 from .saving import check_places, files_read, save_copy, save_target
@@ -97,10 +98,10 @@ def _exit_code(arguments: Sequence[str], *, standalone: bool) -> int:
     except SystemExit as leaving:  # argparse has printed its message
         return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
     except BakeError as error:
-        print(f"softground: {error}", file=sys.stderr)
+        print(f"softground: {said(error)}", file=sys.stderr)
         return EXIT_FAILED_CHECK
     except SoftGroundError as error:
-        print(f"softground: {error}", file=sys.stderr)
+        print(f"softground: {said(error)}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         previous.clear()  # the process is about to end: a second signal must not spoil that

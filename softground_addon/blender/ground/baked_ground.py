@@ -280,8 +280,10 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     table = bake_record.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    inputs, rows_as_edited = bake_record.about["inputs"], as_edited(table, bake_record.steps, bake_record.laid_carves)
-    return events_in_world(rows_as_edited, frame_in(inputs), ground, inputs["unit_scale_m"])
+    inputs, rows = bake_record.about["inputs"], as_edited(table, bake_record.steps, bake_record.laid_carves)
+    if (marks := marks_object.of(ground)) is not None and marks_object.has_numbers(marks):
+        rows = marks_object.floors_of(marks).with_films(rows, bake_record.steps)
+    return events_in_world(rows, frame_in(inputs), ground, inputs["unit_scale_m"])
 
 
 def events_in_world(

@@ -80,7 +80,7 @@ def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[Me
             raise
     raise InputError(
         f"{name} is nothing but hard floor under the character's path: choose a preset for a material there, in "
-        "Advanced > Ground by Material."
+        "Properties > Physics > Ground by Material."
     )
 
 
@@ -144,7 +144,7 @@ def undisturbed_surface(
     Raises
     ------
     InputError
-        If the surface has points that are no numbers.
+        If the surface has points that are no numbers, or modifiers leave it none.
     """
     mesh, name = mesh_of(ground), ground.name
     vertices = rest_vertices(ground, unit_scale, frame)
@@ -157,6 +157,9 @@ def undisturbed_surface(
             faces = mesh_arrays.read_faces(evaluated)
             surface, slots = _transform(to_world, faces.positions), ground_slots.of_faces(evaluated)
             factors = painted_ground.factors(ground, evaluated, painted)
+        if not len(faces.triangle_face):
+            remedy = "if they show instances, let Realize Instances follow, or apply them."
+            raise InputError(f"The modifiers of ground '{name}' give it no faces to print on: {remedy}")
         if len(surface) == len(vertices):
             vertices = surface
     yield

@@ -61,7 +61,7 @@ def are_undone(
         if detail == "NEVER":
             raise InputError(
                 f"The modifier '{barrier.name}' of ground '{ground.name}' keeps prints from playing: set Detail to "
-                "Automatic in Advanced > Mesh and Look, or apply it."
+                "Automatic in Properties > Physics > Mesh and Look, or apply it."
             )
         return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
@@ -81,7 +81,7 @@ def are_undone(
     if detail == "NEVER":
         raise InputError(
             f"Prints on ground '{ground.name}' would not show, as its modifiers undo them: set Detail to Automatic in "
-            "Advanced > Mesh and Look, or apply the modifiers."
+            "Properties > Physics > Mesh and Look, or apply the modifiers."
         )
     return True
 

@@ -42,7 +42,7 @@ def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
     if name and name != SoftGroundPainted.bl_rna.properties[setting].default:
         raise InputError(
             f"Ground '{ground.name}' has no vertex group or attribute '{name}': paint one of that name, or leave the "
-            "field in Advanced > Masks empty."
+            "field in Properties > Physics > Masks empty."
         )
     return ""
 

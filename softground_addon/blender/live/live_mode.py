@@ -24,13 +24,14 @@ from ...core.ground.sparse_grid import Window
 from ...core.loads.cell_limits import check_cell_size
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
-from ...core.settings import TIME_LIMIT, Acts, BakeSettings
+from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report
 from ..baking.publish import at_the_end, publish, sign, with_debris
 from ..ground import baked_ground, ground_surface
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of
+from ..remedies import said
 from .live_ground import LiveGround
 
 Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
@@ -177,9 +178,9 @@ class LiveMode:
         if known is None:
             raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
-            check_cell_size(known.loads, asked.fineness, asked.longest_bake_s, set_by=TIME_LIMIT)
+            check_cell_size(known.loads, asked.fineness, asked.longest_bake_s)
         except InputError as error:  # the last ground stays shown
-            self._refused = asked, str(error)
+            self._refused = asked, said(error)
             return
         whole = self._playhead
         if not self._presses_like(known, asked):

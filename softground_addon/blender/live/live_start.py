@@ -15,7 +15,7 @@ from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
 from ...core.numerics.arrays import Array, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
-from ...core.settings import TIME_LIMIT, BakeSettings
+from ...core.settings import BakeSettings
 from .. import settings
 from ..baking.bake_checks import coverage, wants_detail
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
@@ -39,7 +39,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
     """
     wanted = settings_of(scene)
     known = yield from analysis.reading(scene)
-    check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s, set_by=TIME_LIMIT)
+    check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
     playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         place = yield from _place(drafts, scene, wanted, known.shot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,9 +117,10 @@ class NodeGraph:
         inputs = {"Geometry": geometry, "Selection": selection}
         return self.node("GeometryNodeDeleteGeometry", inputs, domain="POINT").outputs["Geometry"]
 
-    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
-        """Put the selected vertices elsewhere."""
-        inputs = {"Geometry": geometry, "Selection": selection, "Position": position, "Offset": offset}
+    def put(self, geometry: Any, selection: Any, position: Any = None, offset: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Put the selected vertices elsewhere, from where they are if no position is given."""
+        inputs = {"Geometry": geometry, "Selection": selection, "Offset": offset}
+        inputs |= {} if position is None else {"Position": position}
         return self.node("GeometryNodeSetPosition", inputs).outputs["Geometry"]
 
     def put_higher(self, geometry: Any, up: Any, height: Any) -> Any:
@@ -135,15 +136,17 @@ class NodeGraph:
         node = self.node("GeometryNodeStoreNamedAttribute", inputs, data_type=kind, domain=domain)
         return node.outputs["Geometry"]
 
-    def captured(self, geometry: Any, *numbers: Number, kind: str = "FLOAT") -> tuple[Any, list[Number]]:
-        """The geometry with numbers or vectors that are computed together and once, and these as it has them."""
-        node = self.node("GeometryNodeCaptureAttribute", domain="POINT")
+    def captured(
+        self, geometry: Any, *numbers: Number, kinds: str | Sequence[str] = "FLOAT", domain: str = "POINT"
+    ) -> tuple[Any, list[Number]]:
+        """The geometry with fields, of one kind or several, computed together and once, and these as it has them."""
+        node = self.node("GeometryNodeCaptureAttribute", domain=domain)
         names = [f"Value {count}" for count in range(len(numbers))]
         if [item.name for item in node.capture_items] != names:
             if self._known is not None:
                 raise OtherGraphError
-            for name in names:
-                node.capture_items.new(kind, name)
+            for count, name in enumerate(names):
+                node.capture_items.new(kinds if isinstance(kinds, str) else kinds[count], name)
         self.link(geometry, node.inputs["Geometry"])
         for name, number in zip(names, numbers, strict=True):
             self.link(number.socket, node.inputs[name])
@@ -192,9 +195,9 @@ class NodeGraph:
         inputs = {"Curves": splines, "Length": length, "Curve Index": number}
         return self.node("GeometryNodeSampleCurve", inputs, mode="LENGTH", data_type="FLOAT", use_all_curves=False)
 
-    def accumulated(self, parts: Any, kind: str = "FLOAT") -> Any:
-        """A node with sums of a field over points: those before each, those up to and with it, and of all."""
-        return self.node("GeometryNodeAccumulateField", {"Value": parts}, data_type=kind, domain="POINT")
+    def accumulated(self, parts: Any, kind: str = "FLOAT", domain: str = "POINT") -> Any:
+        """A node with sums of a field over a domain: those before each, those up to and with it, and of all."""
+        return self.node("GeometryNodeAccumulateField", {"Value": parts}, data_type=kind, domain=domain)
 
     def object_geometry(self, obj: bpy.types.Object, name: str) -> Any:
         """The geometry of an object, by a node of this name."""
@@ -207,10 +210,10 @@ class NodeGraph:
         """So many points."""
         return self.node("GeometryNodePoints", {"Count": count}).outputs[0]
 
-    def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
+    def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR", domain: str = "POINT") -> Any:
         """Value of a field at one of a geometry's points, or at the last of them."""
         inputs = {"Geometry": geometry, "Value": value, "Index": index}
-        node = self.node("GeometryNodeSampleIndex", inputs, data_type=kind, domain="POINT", clamp=True)
+        node = self.node("GeometryNodeSampleIndex", inputs, data_type=kind, domain=domain, clamp=True)
         return node.outputs["Value"]
 
     def repeated(

@@ -15,6 +15,7 @@ from ..operator_base import reports_errors
 from ..placement import to_world, units_about
 from ..properties import SoftGroundPainted
 from ..reading import analysis
+from ..remedies import said
 from ..translation import translated
 from .shot_setup import selected_ground
 
@@ -59,7 +60,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
         try:
             laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
         except InputError as error:
-            raise InputError(f"'{obj.name}' cannot be covered. {error}") from None
+            raise InputError(f"'{obj.name}' cannot be covered. {said(error)}") from None
         with analysis.own_changes(scene):
             ground = _object_of(laid, f"{obj.name} Cover", units.unit_scale_m, thickness)
             ground.matrix_basis = to_world(units.frame, obj)

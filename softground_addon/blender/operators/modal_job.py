@@ -14,6 +14,7 @@ from ...core.settings import ObjectName
 from .. import jobs, session, settings
 from ..characters.character_setup import characters_of
 from ..operator_base import OnShot, reports_errors
+from ..remedies import said
 from ..state import state
 from ..translation import translated
 from .panel_base import CATEGORY
@@ -164,7 +165,7 @@ class ModalJob(bpy.types.Operator):
             is_done = self._work(until=now + TICK)
         except SoftGroundError as error:
             self._end()
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, said(error))
             return {"CANCELLED"}
         except BaseException:
             self._end()
@@ -351,7 +352,7 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     for area in context.screen.areas if context.screen else ():
         for region in area.regions:
             if (
-                area.type in session.PANEL_AREAS
+                area.type == "VIEW_3D"
                 and region.type == "UI"
                 and region.active_panel_category == CATEGORY
                 and 0 <= event.mouse_x - region.x < region.width

@@ -1,4 +1,4 @@
-"""Base of the sidebar's panels."""
+"""Bases of the panels: those of the sidebar, and those of a ground or character in Properties > Physics."""
 
 from __future__ import annotations
 
@@ -6,23 +6,17 @@ from typing import Any
 
 import bpy
 
-from .. import session
+from .. import session, settings
+from ..ground import baked_ground
 from ..translation import CONTEXT
 
 CATEGORY = "SoftGround"
 """The sidebar's tab."""
 
 
-ADVANCED = "SOFTGROUND_PT_advanced"
-"""The panel that holds all that is not on the first screen."""
+class _Panel:
+    """A panel in Blender's property style."""
 
-
-class SidebarPanel:
-    """A panel in the add-on's tab, in Blender's property style."""
-
-    bl_space_type: Any = "VIEW_3D"
-    bl_region_type: Any = "UI"
-    bl_category = CATEGORY
     bl_translation_context = CONTEXT
 
     layout: Any
@@ -36,11 +30,56 @@ class SidebarPanel:
         return layout
 
 
-class AdvancedPanel(SidebarPanel):
-    """A panel that is not on the first screen."""
+class SidebarPanel(_Panel):
+    """A panel in the add-on's tab."""
 
-    bl_parent_id = ADVANCED
+    bl_space_type: Any = "VIEW_3D"
+    bl_region_type: Any = "UI"
+    bl_category = CATEGORY
+
+
+class _PhysicsPanel(_Panel):
+    """A panel in Properties > Physics of an object."""
+
+    bl_space_type: Any = "PROPERTIES"
+    bl_region_type: Any = "WINDOW"
+    bl_context = "physics"
     bl_options: Any = {"DEFAULT_CLOSED"}
+
+
+def belongs_to(character: Any, obj: bpy.types.Object | None) -> bool:
+    """True if an object is a character's armature, its skin or one of its props."""
+    if character is None or obj is None:
+        return False
+    rig = obj.find_armature()
+    of_it = (character.armature, character.body, *(sole.object for sole in character.soles))
+    return obj in of_it or (rig is not None and rig == character.armature)
+
+
+class CharacterPanel(_PhysicsPanel):
+    """A part of the chosen character's settings."""
+
+    bl_parent_id = "SOFTGROUND_PT_of_character"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the active object belongs to the character that is chosen in the list."""
+        chosen = chosen_of(settings.options_of(context), "characters", "active_character")
+        return belongs_to(chosen, context.object) and settings.is_set_up(chosen)
+
+
+class GroundPanel(_PhysicsPanel):
+    """A part of the ground's settings; beside those of the chosen character until there is a ground."""
+
+    bl_parent_id = "SOFTGROUND_PT_of_ground"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the active object is the ground, or the copy of it that takes the prints."""
+        options = settings.options_of(context)
+        if options.ground is None:
+            return belongs_to(chosen_of(options, "characters", "active_character"), context.object)
+        return context.object in (options.ground, baked_ground.display_mesh_of(options.ground))
 
 
 def draw_list(layout: Any, owner: Any, items: str, active: str, item: str, *, rows: int = 2, most: int = 6) -> None:

@@ -25,6 +25,7 @@ from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..reading.analysis import Analysis
+from ..remedies import said
 from ..state import state
 from ..translation import translated
 from .modal_job import ReadingShot, Reports
@@ -142,7 +143,7 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     except InputError as error:
         if bpy.app.background:
             raise  # Blender writes it to the console
-        message = str(error)
+        message = said(error)
         bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
 
 

@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty
+from bpy.props import BoolProperty, EnumProperty
 
 from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
@@ -28,6 +28,7 @@ from ..sampling.body_sampling import deforms
 from ..sampling.rig_checks import is_animated
 from ..sampling.skin_sampling import meshes_on
 from ..translation import translated
+from .character_editing import active_character
 from .modal_job import Reading, Reports
 
 
@@ -212,29 +213,45 @@ def selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     return None if belongs else trail_detail.ground_of(obj)
 
 
-class SOFTGROUND_OT_select_shown(bpy.types.Operator):
-    """Select the copy of the ground that takes the prints, with their playback and weather in its modifiers"""
+class SOFTGROUND_OT_open_settings(bpy.types.Operator):
+    """Select what has these settings, and show them in Properties > Physics"""
 
-    bl_idname = "softground.select_shown"
-    bl_label = "Select What Shows the Prints"
+    bl_idname = "softground.open_settings"
+    bl_label = "Open Settings"
     bl_options = {"REGISTER", "UNDO"}
+
+    of: EnumProperty(
+        name="Of",
+        items=[
+            ("GROUND", "Ground", "The ground, or the copy of it that takes the prints"),
+            ("CHARACTER", "Character", "The character that is chosen in the list"),
+        ],
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a copy of the ground shows the prints, and objects can be selected."""
-        ground = settings.options_of(context).ground
-        cls.poll_message_set(translated("The ground shows its prints itself"))
-        if ground is None or trail_detail.detail_of(ground) is None:
-            return False
+        """True if objects can be selected."""
         cls.poll_message_set(translated("Switch to Object Mode first"))
         return context.mode == "OBJECT"
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        shown = baked_ground.display_mesh_of(settings.options_of(context).ground)
+        options = settings.options_of(context)
+        character, shown = active_character(options), None
+        if self.of == "GROUND" and options.ground is not None:
+            shown = baked_ground.display_mesh_of(options.ground)
+        elif character:  # a ground that is not there yet has its settings beside those of the character
+            shown = settings.body_of(character)
+        if shown is None:
+            raise InputError("Add a character first")
         if shown.name not in context.view_layer.objects or not shown.visible_get():
             raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
         created_ground.select(settings.scene_of(context), shown)
+        editors = [area for area in context.screen.areas if area.type == "PROPERTIES"] if context.screen else []
+        for area in editors:
+            area.spaces.active.context = "PHYSICS"
+        if not editors:
+            self.report({"INFO"}, translated("Its settings are in Properties > Physics"))
         return {"FINISHED"}
 
 
@@ -349,7 +366,7 @@ CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_use_as_ground,
     SOFTGROUND_OT_create_ground,
-    SOFTGROUND_OT_select_shown,
+    SOFTGROUND_OT_open_settings,
     SOFTGROUND_OT_clear_bake,
     SOFTGROUND_OT_apply_look,
     SOFTGROUND_OT_copy_bake_command,

@@ -68,15 +68,17 @@ Writer = Callable[[bpy.types.Object, Options], list[Path]]
 
 
 def _images(ground: bpy.types.Object, options: Options) -> list[Path]:
+    scene = settings.scene_of(bpy.context)
     return image_exports.export_images(
         ground,
         options.path.parent,
         options.start,
         options.end,
-        units=settings.units_of(settings.scene_of(bpy.context)),
+        units=settings.units_of(scene),
         resolution=options.resolution,
         uv_map=options.uv_map,
         name=options.path.stem,
+        floors=settings.hard_grounds_of(scene.softground),
     )
 
 
@@ -164,7 +166,7 @@ FORMATS = {
     "EXR": Format(
         ".exr",
         "Images (EXR)",
-        "Displacement, and compression, rim and age as a mask, in the ground's UV map",
+        "Displacement, and compression, rim and age as a mask, in the ground's UV map; marks in those of floors",
         _images,
         _BUILT.image_openexr,
     ),

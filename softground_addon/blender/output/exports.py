@@ -6,7 +6,7 @@ All write the open scene, as Blender's exporters do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ def export_point_cache(ground: bpy.types.Object, path: Path, start: int, end: in
     up = ground_surface.up_of(display_mesh, unit_scale, frame_of_bake)
 
     def samples() -> Iterator[NDArray[np.float32]]:
-        for frame in range(start, end + 1):
+        for frame in counted(start, end):
             height = over_time.movement.at(frame, len(moved))[:, :1]
             sample = rest.copy()
             sample[moved] += (height * up).astype(np.float32)
@@ -208,6 +208,34 @@ def baked_display_mesh(ground: bpy.types.Object) -> bpy.types.Object:
     return display_mesh
 
 
+def counted(start: int, end: int) -> Iterator[int]:
+    """The frames of a file that is written, with the progress at the mouse cursor."""
+    with _progress(start, end) as show:
+        for frame in range(start, end + 1):
+            yield frame
+            show(frame)
+
+
+@contextmanager
+def _progress(start: int, end: int) -> Iterator[Callable[[int], None]]:
+    """Progress at the mouse cursor, by a function of the frame that is done."""
+
+    def show(frame: int) -> None:
+        if start <= frame <= end:
+            _show((frame - start + 1) / (end - start + 1))
+
+    manager = bpy.context.window_manager
+    manager.progress_begin(0.0, 1.0)
+    try:
+        yield show
+    finally:
+        manager.progress_end()
+
+
+def _show(done: float) -> None:
+    bpy.context.window_manager.progress_update(done)
+
+
 @contextmanager
 def _only(
     display_mesh: bpy.types.Object, start: int, end: int, marks: bpy.types.Object | None = None
@@ -248,9 +276,14 @@ def _only(
 
 
 def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:
-    result = set()
-    with written_by_blender(partial, path):
-        result = export(filepath=str(partial), check_existing=False, **options)
+    scene, result = settings.scene_of(bpy.context), set()
+    changed = bpy.app.handlers.frame_change_post
+    with _progress(scene.frame_start, scene.frame_end) as show, written_by_blender(partial, path):
+        changed.append(on_frame := lambda changing, *_: show(changing.frame_current))
+        try:
+            result = export(filepath=str(partial), check_existing=False, **options)
+        finally:
+            changed.remove(on_frame)
     if "FINISHED" not in result or not partial.is_file():
         raise InputError(f"'{path}' could not be written by Blender's exporter: see its messages.")
 

@@ -23,6 +23,7 @@ from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
+from ..remedies import said
 from ..translation import translated
 
 FORCE, CONTACT = "force", "contact"
@@ -214,7 +215,8 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         try:
             estimates = estimates_of(analysis.read(scene).loads, frames)
         except SoftGroundError as error:  # the record exists without its characters
-            self.report({"WARNING"}, translated("Normal forces only, as the shot cannot be read: {error}", error=error))
+            why = translated("Normal forces only, as the shot cannot be read: {error}", error=said(error))
+            self.report({"WARNING"}, why)
             estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
         files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), estimates))

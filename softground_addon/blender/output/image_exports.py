@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +25,17 @@ from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
 from ...core.rig.recording import SceneUnits
 from .. import mesh_arrays
+from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_surface, refined_mesh
 from ..weather import weathered_points
-from .exports import baked_display_mesh, written_by_blender
+from .exports import baked_display_mesh, counted, written_by_blender
+from .mark_images import FloorImage, floor_images
 
-DISPLACEMENT, MASK, WEATHER, DEBRIS = "displacement", "mask", "weather", "debris"
+DISPLACEMENT, MASK, WEATHER, DEBRIS, MARKS = "displacement", "mask", "weather", "debris", "marks"
 """Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,
 wetness and fresh snow, 0 to 1, and depth of standing water [m]; with debris, its volume over area [m], the share that
-it covers, 0 to 1, and the time since it came down [s], `NEVER` where none did."""
+it covers, 0 to 1, and the time since it came down [s], `NEVER` where none did; of floors, see `FloorImage.at`."""
 FINEST_FALLOUT = 0.01
 """Least side of the squares over which debris is summed [m]; in coarse images it is that of a pixel."""
 FARTHEST_FALLOUT = 3.0
@@ -55,6 +58,7 @@ def export_images(
     resolution: int = 2048,
     uv_map: str = "",
     name: str = "",
+    floors: Sequence[bpy.types.Object] = (),
 ) -> list[Path]:
     """Write displacement and masks as OpenEXR sequences of 32-bit floats in the ground's UV space.
 
@@ -77,6 +81,8 @@ def export_images(
         Name of the UV map; by default the one that is rendered.
     name : str
         Beginning of the files' names; by default the ground's name.
+    floors : sequence of bpy.types.Object, optional
+        Hard ground; of each that has a UV map and marks, `<name>_marks_<floor>_<frame>.exr`.
 
     Raises
     ------
@@ -115,7 +121,7 @@ def export_images(
             water = water_at(relief, len(x))
             points = weathered_points.weathered_points(ground, position, over_time, water, units.unit_scale_m)
             at = open_.enter_context(points)
-        for frame in range(start, end + 1):
+        for frame in counted(start, end):
             height, compression = over_time.movement.at(frame, len(x)).T
             rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), units.frame_rate)
             kinds: dict[str, tuple[Array, ...]] = {}
@@ -131,7 +137,20 @@ def export_images(
                 path = folder / f"{stem}_{kind}_{frame:04d}.exr"
                 _save(image, resolution, pixels.index, np.stack(channels, axis=-1), path)
                 paths.append(path)
+        for each, frame in product(_marked(ground, floors, units, resolution), range(start, end + 1)):
+            path = folder / f"{stem}_{MARKS}_{bpy.path.clean_name(each.floor)}_{frame:04d}.exr"
+            _save(image, resolution, each.index, each.at(frame), path)
+            paths.append(path)
     return paths
+
+
+def _marked(
+    ground: bpy.types.Object, floors: Sequence[bpy.types.Object], units: SceneUnits, resolution: int
+) -> Iterator[FloorImage]:
+    """Images of the marks that a ground has."""
+    marks = marks_object.of(ground)
+    if marks is not None and marks_object.has_numbers(marks):
+        yield from floor_images(marks, floors, units, resolution)
 
 
 def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:

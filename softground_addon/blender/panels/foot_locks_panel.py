@@ -1,4 +1,4 @@
-"""The sidebar's list of contacts that Clean Feet holds in a way of their own."""
+"""The list of contacts that Clean Feet holds in a way of their own."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..operator_base import reports_errors
 from ..operators.character_editing import active_character
-from ..operators.panel_base import Listed, SidebarPanel, chosen_of, draw_list, remove_chosen
+from ..operators.panel_base import CharacterPanel, Listed, chosen_of, draw_list, remove_chosen
 from ..translation import CONTEXT, translated
 
 
@@ -46,7 +46,9 @@ def _foot_at_hand(character: Any, chosen: bpy.types.PoseBone | None) -> str:
     bones = armature.pose.bones
     feet = [sole for sole in character.soles if not sole.object and sole.bone in bones]
     if not feet:
-        raise InputError(f"'{armature.name}' has no foot with a bone: choose its bones in Advanced > Contacts.")
+        raise InputError(
+            f"'{armature.name}' has no foot with a bone: choose its bones in Properties > Physics > Contacts."
+        )
     names = {name: sole.name for sole in feet for name in (sole.bone, sole.toe_bone)}
     if chosen is not None and chosen.id_data == armature and chosen.name in names:
         return names[chosen.name]
@@ -85,12 +87,10 @@ class SOFTGROUND_UL_foot_locks(Listed):
         row.prop(item, "mode", text="", emboss=False)
 
 
-class SOFTGROUND_PT_foot_locks(SidebarPanel, bpy.types.Panel):
+class SOFTGROUND_PT_foot_locks(CharacterPanel, bpy.types.Panel):
     """Contacts that Clean Feet locks in another way than the rest; press Clean Feet again after a change"""
 
     bl_label = "Foot Locks"
-    bl_parent_id = "SOFTGROUND_PT_response"
-    bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()

@@ -1,4 +1,4 @@
-"""The sidebar's part on the ground's physics, its layers, what is painted on it, and its mesh."""
+"""The look of prints and hard ground in the sidebar; the ground's own settings, in Properties > Physics."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import painted_ground
 from ..operators import prediction
-from ..operators.character_editing import active_character
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, draw_list
+from ..operators.panel_base import GroundPanel, Listed, SidebarPanel, draw_list
 from ..translation import CONTEXT, translated
+from .panels import draw_preset
 
 
 class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
@@ -30,6 +30,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         options = settings.options_of(context)
         column = layout.column()
+        column.prop(options, "cell_size_cm")
         column.prop(options, "relief")
         amount = column.row()
         amount.active = options.relief != "OFF"
@@ -52,21 +53,27 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         column.prop(options, "tread_pattern")
         if options.tread_pattern == IMAGE:
             column.template_ID(options, "tread_image", open="image.open")
-        row = column.row()
-        row.active = settings.sinks_feet(options)
-        row.prop(options, "carve")
         column.prop(options, "debris")
         if options.debris and options.ground is not None:
             _wind(column, options.ground)
         column.prop(options, "marks")
-        if options.marks and (character := active_character(options)):
-            column.prop(character, "dirty_soles")
         if options.marks and options.ground is not None and (marks := marks_object.of(options.ground)):
             for name, field in marks_object.fields_of(marks):
                 column.prop(*field, text=name)
+        layout.operator("softground.open_settings", text="More of the Ground", icon="PHYSICS").of = "GROUND"
 
 
-class SOFTGROUND_PT_material(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_of_ground(GroundPanel, bpy.types.Panel):
+    """Settings of the ground"""
+
+    bl_label = "SoftGround Ground"
+    bl_parent_id = ""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_preset(self.fields(), settings.scene_of(context))
+
+
+class SOFTGROUND_PT_material(GroundPanel, bpy.types.Panel):
     """How the ground gives way"""
 
     bl_label = "Realism"
@@ -74,11 +81,12 @@ class SOFTGROUND_PT_material(AdvancedPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         scene = settings.scene_of(context)
-        options, character = scene.softground, active_character(scene.softground)
-        if character:
-            layout.prop(character, "force_model")
+        options = scene.softground
         column = layout.column()
         column.prop(options, "pressure")
+        row = column.row()
+        row.active = settings.sinks_feet(options)
+        row.prop(options, "carve")
         for field in ("stiffness_mpa", "poisson_ratio", "rim_reach_cm", "rim_bias", "repose_angle"):
             column.prop(options.material, field)
         for field in ("characteristic_time", "shortest_time"):
@@ -86,7 +94,7 @@ class SOFTGROUND_PT_material(AdvancedPanel, bpy.types.Panel):
         layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
 
 
-class SOFTGROUND_PT_layers(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_layers(GroundPanel, bpy.types.Panel):
     """Depth of the loose layer, its crust, the firm ground below it, and how it gives way"""
 
     bl_label = "Layers"
@@ -104,14 +112,14 @@ class SOFTGROUND_PT_layers(AdvancedPanel, bpy.types.Panel):
             column.prop(material, field)
 
 
-class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_painted(GroundPanel, bpy.types.Panel):
     """Vertex groups or float attributes that vary the ground from place to place"""
 
     bl_label = "Masks"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return settings.options_of(context).ground is not None
+        return super().poll(context) and settings.options_of(context).ground is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.fields().column()
@@ -122,7 +130,7 @@ class SOFTGROUND_PT_painted(AdvancedPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
-class SOFTGROUND_PT_regions(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_regions(GroundPanel, bpy.types.Panel):
     """What the ground is made of in each of its materials"""
 
     bl_label = "Ground by Material"
@@ -130,7 +138,8 @@ class SOFTGROUND_PT_regions(AdvancedPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         ground = settings.options_of(context).ground
-        return ground is not None and (len(ground.material_slots) > 1 or any(ground_slots.naming(ground)))
+        has_several = ground is not None and (len(ground.material_slots) > 1 or any(ground_slots.naming(ground)))
+        return super().poll(context) and has_several
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.fields().column(align=True)
@@ -150,10 +159,12 @@ class SOFTGROUND_UL_hard_grounds(Listed):
         layout.prop(item, "object", text="", emboss=False, icon="MESH_CUBE")
 
 
-class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_hard_ground(SidebarPanel, bpy.types.Panel):
     """Crates, stairs, floors and rocks that feet stand on without a print"""
 
     bl_label = "Hard Ground"
+    bl_parent_id = "SOFTGROUND_PT_feet"
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         options = settings.options_of(context)
@@ -163,7 +174,7 @@ class SOFTGROUND_PT_hard_ground(AdvancedPanel, bpy.types.Panel):
             layout.prop(options.hard_grounds[options.active_hard_ground], "wet")
 
 
-class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
+class SOFTGROUND_PT_mesh(GroundPanel, bpy.types.Panel):
     """How fine the ground is, and what it looks like"""
 
     bl_label = "Mesh and Look"
@@ -176,7 +187,6 @@ class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
         column.prop(options.material, "surface")
         column.operator("softground.apply_look", icon="MATERIAL")
         column.prop(options, "under")
-        column.prop(options, "cell_size_cm")
         column.prop(options, "longest_bake")
         column.prop(options.material, "blur_sigma_cm")
         column.prop(options, "detail")
@@ -185,6 +195,9 @@ class SOFTGROUND_PT_mesh(AdvancedPanel, bpy.types.Panel):
         row = column.row()
         row.active = options.shape_keys
         row.prop(options, "dense_shape_keys")
+        if options.marks and settings.hard_grounds_of(options):
+            column.prop(options, "carried_amount")
+            column.prop(options, "carried_reach")
 
 
 def vertices(wanted: float, most: int) -> str:
@@ -233,6 +246,7 @@ def _wind(layout: Any, ground: Any) -> None:
 
 CLASSES = (
     SOFTGROUND_PT_prints,
+    SOFTGROUND_PT_of_ground,
     SOFTGROUND_PT_material,
     SOFTGROUND_PT_layers,
     SOFTGROUND_PT_regions,

@@ -49,6 +49,7 @@ PAGES = (
     ("bpy.ops.softground.*character", "panel.html#character"),
     ("bpy.types.softgroundcharacter.*", "panel.html#character"),
     ("bpy.types.softgroundsole.*", "panel.html#character"),
+    ("bpy.ops.softground.open_settings", "panel.html#physics"),
     ("bpy.ops.softground.live", "panel.html#live"),
     ("bpy.ops.softground.overlay", "panel.html#overlay"),
     ("bpy.ops.softground.*", "panel.html"),

@@ -27,25 +27,38 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.show_prints", icon="VIEWZOOM")
         layout.operator("softground.clear_bake", icon="TRASH")
         layout.operator("softground.apply_look", icon="MATERIAL")
-        layout.operator_menu_enum("softground.give_way", "kind", icon="STRANDS")
         layout.operator("softground.add_sample_meadow", icon="STRANDS")
         layout.separator()
         layout.operator("softground.overlay", icon="HIDE_OFF")
         layout.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
         layout.operator("softground.match_depth")
         layout.separator()
-        layout.operator("softground.force_curves", icon="GRAPH")
-        layout.operator("softground.export_forces", icon="EXPORT")
-        layout.operator("softground.event_markers", icon="MARKER_HLT")
-        layout.operator("softground.event_points", icon="POINTCLOUD_DATA")
-        layout.operator("softground.make_sound", icon="SOUND")
+        layout.menu("SOFTGROUND_MT_output", icon="EXPORT")
         layout.separator()
+        layout.operator("softground.open_manual", icon="HELP")
+
+
+class SOFTGROUND_MT_output(bpy.types.Menu):
+    """Use the bake elsewhere: files, markers, sound, plants that give way"""
+
+    bl_label = "Output"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("softground.export", icon="EXPORT")
         layout.operator("softground.final_mesh", icon="MESH_DATA")
         layout.separator()
-        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
+        layout.operator("softground.force_curves", icon="GRAPH")
+        layout.operator("softground.export_forces", icon="EXPORT")
         layout.separator()
-        layout.operator("softground.open_manual", icon="HELP")
+        layout.operator("softground.event_markers", icon="MARKER_HLT")
+        layout.operator("softground.event_points", icon="POINTCLOUD_DATA")
+        layout.operator("softground.make_sound", icon="SOUND")
+        layout.operator("softground.make_keys", icon="KEYINGSET")
+        layout.operator_menu_enum("softground.give_way", "kind", icon="STRANDS")
+        layout.separator()
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 
 def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
@@ -64,18 +77,30 @@ def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
     menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
 
 
+def draw_in_export_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the ground to what can be exported."""
+    menu.layout.operator("softground.export", text="SoftGround (.abc, .usdc, .pc2, .exr, ...)")
+
+
+_ENTRIES = {
+    "VIEW3D_MT_object": draw_in_object_menu,
+    "VIEW3D_MT_mesh_add": draw_in_add_menu,
+    "VIEW3D_MT_armature_add": draw_in_armature_menu,
+    "TOPBAR_MT_file_export": draw_in_export_menu,
+}
+"""What is appended to Blender's own menus, by their names."""
+
+
 def register() -> None:
     """Add the entries."""
-    bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
-    bpy.types.VIEW3D_MT_mesh_add.append(draw_in_add_menu)
-    bpy.types.VIEW3D_MT_armature_add.append(draw_in_armature_menu)
+    for name, draw in _ENTRIES.items():
+        getattr(bpy.types, name).append(draw)
 
 
 def unregister() -> None:
     """Take the entries away."""
-    bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
-    bpy.types.VIEW3D_MT_mesh_add.remove(draw_in_add_menu)
-    bpy.types.VIEW3D_MT_armature_add.remove(draw_in_armature_menu)
+    for name, draw in _ENTRIES.items():
+        getattr(bpy.types, name).remove(draw)
 
 
-CLASSES = (SOFTGROUND_MT_object,)
+CLASSES = (SOFTGROUND_MT_object, SOFTGROUND_MT_output)

@@ -1,4 +1,7 @@
-"""The sidebar: what to set, in the order of work. Panels read and show; nothing is computed or changed in `draw`."""
+"""The sidebar: what to set for a shot, in the order of work; and a character's own settings, in Properties > Physics.
+
+Panels read and show; nothing is computed or changed in `draw`.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,11 @@ from .. import session, settings
 from ..characters import selection
 from ..characters.character_setup import title_of
 from ..characters.import_fixes import is_captured, stature_of
-from ..ground import baked_ground, ground_mesh, still_ground, trail_detail
+from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
 from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import AdvancedPanel, Listed, SidebarPanel, chosen_of, draw_list
+from ..operators.panel_base import CharacterPanel, Listed, SidebarPanel, belongs_to, chosen_of, draw_list
 from ..settings import is_prop, is_set_up
 from ..translation import translated
 from . import outdated, preset_menu
@@ -135,26 +138,33 @@ def _no_contacts(layout: Any, character: Any) -> None:
         box.prop(character.soles[0], "object")
 
 
-class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
-    """Settings that rarely need a change"""
+class SOFTGROUND_PT_of_character(CharacterPanel, bpy.types.Panel):
+    """Settings of a character"""
 
-    bl_label = "Advanced"
-    bl_order = 4
-    bl_options: Any = {"DEFAULT_CLOSED"}
+    bl_label = "SoftGround Character"
+    bl_parent_id = ""
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        pass
-
-
-class _OfCharacter(AdvancedPanel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character is chosen."""
-        character = active_character(settings.options_of(context))
-        return bool(character and is_set_up(character))
+        """True if the active object belongs to any character."""
+        characters = settings.options_of(context).characters
+        return any(belongs_to(character, context.object) for character in characters)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        options, obj = settings.options_of(context), context.object
+        character = active_character(options)
+        if belongs_to(character, obj):
+            for field in ("mass", "dirty_soles", "force_model"):
+                layout.prop(character, field)
+            return
+        number, other = next(found for found in enumerate(options.characters) if belongs_to(found[1], obj))
+        text = translated("Choose '{name}'", name=title_of(other))
+        button = layout.operator("wm.context_set_int", text=text, icon="ARMATURE_DATA", translate=False)
+        button.data_path, button.value = "scene.softground.active_character", number
 
 
-class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
+class SOFTGROUND_PT_soles(CharacterPanel, bpy.types.Panel):
     """Parts that touch the ground and print"""
 
     bl_label = "Contacts"
@@ -184,16 +194,15 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
         layout.prop(sole, "object")
 
 
-class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
+class SOFTGROUND_PT_joints(CharacterPanel, bpy.types.Panel):
     """Bones that carry the body's mass"""
 
     bl_label = "Body Bones"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character with an armature is chosen."""
-        character = active_character(settings.options_of(context))
-        return bool(character and character.armature)
+        """True if that character has an armature."""
+        return super().poll(context) and active_character(settings.options_of(context)).armature is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
@@ -224,40 +233,37 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         options = scene.softground
         layout.prop(options, "ground", text="")
-        if options.ground is not None and (shown := trail_detail.detail_of(options.ground)):
-            text = translated("Shown by {name}", name=shown.name)
-            layout.operator("softground.select_shown", text=text, icon="RESTRICT_SELECT_OFF", translate=False)
         row = layout.row(align=True)
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")
-        row = layout.row(align=True)
-        title, picture = preset_menu.title_of_ground(options) or "Presets", preset_menu.picture_of_ground(options)
-        row.menu("SOFTGROUND_MT_presets", text=title, icon_value=picture, translate=False)
-        row.operator("softground.save_preset", text="", icon="ADD")
-        row.operator("softground.remove_preset", text="", icon="REMOVE")
-        surface = SURFACES.get(options.material.surface)  # none where what is stored is broken
-        felt = surface and surface.control
-        layout.prop(
-            *((options, felt) if felt else (options.material, "stiffness_mpa"))
-        )  # nothing moves from ground to ground
-        predicted = prediction.of(scene)
-        row = layout.row(align=True)
-        if predicted is None:
-            row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
-        else:
-            field = row.row(align=True)
-            field.active = predicted.is_current
-            field.prop(options, "depth_cm")
-            row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
-            deepest = prediction.asked(scene).material.deepest
-            if predicted.depth and predicted.depth > NEARLY_AT_BOTTOM * deepest:
-                layout.label(
-                    text=translated("Pressed to the bottom, {depth} cm", depth=f"{deepest * 100:.3g}"),
-                    icon="ERROR",
-                    translate=False,
-                )
+        draw_preset(layout, scene)
         if options.ground is not None:
             _changing_ground(layout, options)
+
+
+def draw_preset(layout: Any, scene: Any) -> None:
+    """The preset, what people know it by, and how deep it lets feet sink."""
+    options = scene.softground
+    row = layout.row(align=True)
+    title, picture = preset_menu.title_of_ground(options) or "Presets", preset_menu.picture_of_ground(options)
+    row.menu("SOFTGROUND_MT_presets", text=title, icon_value=picture, translate=False)
+    row.operator("softground.save_preset", text="", icon="ADD")
+    surface = SURFACES.get(options.material.surface)  # none where what is stored is broken
+    felt = surface and surface.control
+    layout.prop(*((options, felt) if felt else (options.material, "stiffness_mpa")))  # nothing moves between grounds
+    predicted = prediction.of(scene)
+    row = layout.row(align=True)
+    if predicted is None:
+        row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+        return
+    field = row.row(align=True)
+    field.active = predicted.is_current
+    field.prop(options, "depth_cm")
+    row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
+    deepest = prediction.asked(scene).material.deepest
+    if predicted.depth and predicted.depth > NEARLY_AT_BOTTOM * deepest:
+        text = translated("Pressed to the bottom, {depth} cm", depth=f"{deepest * 100:.3g}")
+        layout.label(text=text, icon="ERROR", translate=False)
 
 
 NEARLY_AT_BOTTOM = 0.95
@@ -270,7 +276,10 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
     """Press the prints"""
 
     bl_label = "Bake"
-    bl_order = 2
+    bl_order = 3
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        self.layout.menu("SOFTGROUND_MT_output", icon="EXPORT")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
@@ -366,7 +375,7 @@ CLASSES = (
     SOFTGROUND_PT_character,
     SOFTGROUND_PT_ground,
     SOFTGROUND_PT_bake,
-    SOFTGROUND_PT_advanced,
+    SOFTGROUND_PT_of_character,
     SOFTGROUND_PT_soles,
     SOFTGROUND_PT_joints,
 )

@@ -50,7 +50,7 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
 
     bl_label = "Ground Presets"
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout: Any = self.layout
         ours, _ = listed(presets.FOLDER)
         paths = {preset: path for path, preset in ours}
@@ -65,6 +65,8 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
             _entry(layout, path, preset, translate=False)
         for message in broken:
             layout.label(text=message, icon="ERROR", translate=False)
+        if _chosen_of_user(context):
+            layout.operator("softground.remove_preset", text="Remove Ground Preset", icon="TRASH")
 
 
 def _entry(layout: Any, path: Path, preset: presets.Preset, *, translate: bool) -> None:

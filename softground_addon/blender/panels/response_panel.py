@@ -1,4 +1,4 @@
-"""The sidebar's part on how characters respond to the ground, and its small operators."""
+"""Panels on how characters move on the ground, and their small operators."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
 from ..baking import root_motion
 from ..characters.import_fixes import stature_of
 from ..operators.character_editing import active_character
-from ..operators.panel_base import AdvancedPanel
+from ..operators.panel_base import CharacterPanel, SidebarPanel
 from ..response import response_job
 from ..translation import translated
 
@@ -157,37 +157,57 @@ _REMOVE: dict[LayerKind, Any] = {
 }
 
 
-class SOFTGROUND_PT_response(AdvancedPanel, bpy.types.Panel):
-    """How the character responds to the ground that gives way"""
+class SOFTGROUND_PT_feet(SidebarPanel, bpy.types.Panel):
+    """Feet that neither slide nor float, how they wade, and the layers that move them"""
+
+    bl_label = "Feet"
+    bl_order = 2
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        options = settings.options_of(context)
+        character = active_character(options)
+        if character and character.armature:
+            _of_rig(layout, options, character)
+        column = layout.column(align=True)
+        column.operator("softground.add_contact", icon="PLUS")
+        column.operator("softground.open_settings", text="More of the Character", icon="PHYSICS").of = "CHARACTER"
+
+
+def _of_rig(layout: Any, options: Any, character: Any) -> None:
+    """What corrects the feet of a rig, how it wades, and its layers."""
+    row = layout.row(align=True)
+    row.operator("softground.clean_feet", icon="CON_FLOOR")
+    row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
+    if root_motion.speed_of(character.armature):
+        speed = translated("Travels at {speed} m/s", speed=f"{root_motion.speed_of(character.armature):.2f}")
+        layout.label(text=speed, translate=False)
+    column = layout.column(align=True)
+    column.active = options.grounding.use or settings.sinks_feet(options)
+    for part in settings.PERFORMANCE:
+        column.prop(options.grounding, part)
+    _layers(layout, character)
+
+
+class SOFTGROUND_PT_response(CharacterPanel, bpy.types.Panel):
+    """How characters respond to the ground that gives way"""
 
     bl_label = "Response"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character is chosen."""
-        character = active_character(settings.options_of(context))
-        return bool(character and character.armature)
+        """True if that character has an armature."""
+        return super().poll(context) and active_character(settings.options_of(context)).armature is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
-        options, character = scene.softground, active_character(scene.softground)
-        row = layout.row(align=True)
-        row.operator("softground.clean_feet", icon="CON_FLOOR")
-        row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
-        if character and root_motion.speed_of(character.armature):
-            speed = translated("Travels at {speed} m/s", speed=f"{root_motion.speed_of(character.armature):.2f}")
-            layout.label(text=speed, translate=False)
+        options = settings.options_of(context)
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
         column.active |= settings.sinks_feet(options)
-        column.separator()
-        for part in settings.PERFORMANCE:
-            column.prop(options.grounding, part)
         column = _group(layout, options.tilt, ("strength", "lateral", "frequency", "damping"))
         column.operator_menu_enum("softground.tilt_preset", "source")
-        if character:
-            _layers(layout, character)
 
 
 def _layers(layout: Any, character: Any) -> None:
@@ -197,8 +217,6 @@ def _layers(layout: Any, character: Any) -> None:
         row = layout.row(align=True)
         row.prop(character, kind.strength, slider=True)
         row.operator(_REMOVE[kind].bl_idname, text="", icon="X")
-    if kinds:
-        layout.operator("softground.make_keys", icon="KEYINGSET")
     if LayerKind.RESPONSE in kinds:
         _layer_notes(layout, notes_of(character.armature))
 
@@ -236,5 +254,6 @@ CLASSES = (
     SOFTGROUND_OT_show_frame,
     SOFTGROUND_OT_slow_down,
     *_REMOVE.values(),
+    SOFTGROUND_PT_feet,
     SOFTGROUND_PT_response,
 )

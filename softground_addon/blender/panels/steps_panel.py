@@ -21,7 +21,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
     """Single steps of the bake"""
 
     bl_label = "Steps"
-    bl_order = 3
+    bl_order = 4
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod

@@ -31,7 +31,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
     """Snow, rain, wind and thaw over the baked prints"""
 
     bl_label = "Weather"
-    bl_order = 3
+    bl_order = 4
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
@@ -59,6 +59,8 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         column.prop(options, "weather_hours", slider=True)
         column = layout.column(align=True)
         for name, identifier in weather_modifier.inputs_of(modifier).items():
+            if name == "Time Scale" and not weather_keys.is_keyed(modifier, name):
+                continue  # Shot Lasts sets it
             holder, path = compat.input_field(modifier, identifier)
             text = f"{translated(name)} ({_UNITS[name]})" if name in _UNITS else translated(name)
             column.prop(holder, path, text=text, slider=name == "Halo", translate=False)

@@ -8,7 +8,9 @@ is there. What no sole has come near is only compared.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -29,21 +31,16 @@ ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
 )
 """Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
 direction; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
-_HELD, _OLDER, _SUNK = (f".softground_{name}" for name in ("held", "older", "sunk"))
-"""Of passes meanwhile, vectors: bend, bend of what is worn down, and share of what is not; the same of what is left of
-the earlier one; slope and height now."""
 META = "softground_meta"
 """Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first frame."""
 
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
-_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW = (
-    f".softground_{name}"
-    for name in ("root", "pass", "touched", "chance", "moved", "lean_way", "shift", "base", "part", "low")
-)
-"""Of curves, instances and points meanwhile. `_MOVED` is a vector in the table's space: where it leans [rad], and how
-far its root goes up; `_LEAN` the way of what is upright, for its length."""
-_MEANWHILE = (_ROOT, _PASS, _TOUCHED, _CHANCE, _MOVED, _LEAN, _SHIFT, _BASE, _PART, _LOW)
+_ROOT, _PART, _LOW = (f".softground_{name}" for name in ("root", "part", "low"))
+"""Of the vertices of loose parts meanwhile."""
+_NOWHERE = 1e9
+"""More vertices than a table has."""
+_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 INPUTS = (
     GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
@@ -77,44 +74,57 @@ def is_give_way(tree: Any) -> bool:
 
 @dataclass(frozen=True)
 class _Table:
-    """The table as the group sees it: its vertices, its space in that of the scatter, and its numbers."""
+    """The table as the group sees it, with its numbers and what is chosen.
+
+    Attributes
+    ----------
+    cell_up : vector
+        Up by one cell, in the scatter's space.
+    ways : three vectors
+        Axes of the table for a length of one along its last one, `up`, in the scatter's space.
+    axes, origin : two vectors and a vector
+        By which the column and the row of a place are found.
+    """
 
     vertices: Any
-    to_scatter: Any
-    from_scatter: Any
+    cell_up: Any
+    ways: list[Any]
+    axes: list[Any]
+    origin: Any
     row: Number
     tile: Number
     frame_rate: Number
     columns: Number
     rows: Number
     first_frame: Number
-    up: Any
+    stands: Any
+    sinks: Any
+
+    @property
+    def up(self) -> Any:
+        return self.ways[2]
 
 
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
     frame = graph.number(graph.frame())
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
-    table = _table(graph, chosen["Table"])
+    table = _table(graph, chosen)
     graph.next_row()
-    table = replace(table, vertices=_bent_passes(graph, table, plant, frame))
-    graph.next_row()
-    latest, moved = _latest(graph, table, frame), _moved(graph, table, chosen)
+    passes = _passes(graph, table, plant, frame)
 
     given = chosen["Geometry"]
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
     position = graph.position()
-    root = _at(graph, position, first, "POINT")
-    geometry = _stored(graph, given, "CURVE", root, latest, moved)
-    geometry = _put(graph, table, geometry, "CURVE", position)
+    root, move = _at(graph, position, first, "POINT"), partial(_put, graph, table, position)
+    geometry = _given_way(graph, table, passes, given, "CURVE", root, move)
     graph.next_row()
-    geometry = _stored(graph, geometry, "INSTANCE", position, latest, moved)
-    geometry = _instances_moved(graph, table, geometry, chosen)
+    move = partial(_instances_moved, graph, table, position)
+    geometry = _given_way(graph, table, passes, geometry, "INSTANCE", position, move)
     graph.next_row()
-    loose = _loose_parts_moved(graph, table, geometry, position, latest, moved)
+    loose = _loose_parts_moved(graph, table, passes, geometry, position)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
-    geometry = graph.forgotten(geometry, *_MEANWHILE)
     acts = graph.both(
         graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
@@ -122,16 +132,22 @@ def _fill(graph: NodeGraph) -> None:
     graph.finish(graph.choose("GEOMETRY", acts, given, geometry))
 
 
-def _table(graph: NodeGraph, obj: Any) -> _Table:
-    info = graph.node("GeometryNodeObjectInfo", {"Object": obj}, transform_space="RELATIVE")
+def _table(graph: NodeGraph, chosen: Any) -> _Table:
+    info = graph.node("GeometryNodeObjectInfo", {"Object": chosen["Table"]}, transform_space="RELATIVE")
     vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
-    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter})
+    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter}).outputs["Matrix"]
+    origin = graph.node("FunctionNodeTransformPoint", {"Vector": (0.0, 0.0, 0.0), "Transform": inverted})
+    ways = [_turned(graph, way, to_scatter) for way in _UNITS]
+    cell_up, each = ways[2], graph.math("DIVIDE", 1.0, graph.vector("LENGTH", ways[2], output="Value"))
+    ways = [graph.scaled(way, each) for way in ways]
+    back = [graph.parts(_turned(graph, way, inverted)) for way in _UNITS]
+    axes = [graph.combined(*(way[number].socket for way in back)) for number in (0, 1)]
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
-    up = graph.vector("NORMALIZE", _turned(graph, (0.0, 0.0, 1.0), to_scatter))
-    space = to_scatter, inverted.outputs["Matrix"]
-    return _Table(vertices, *space, row, tile, frame_rate, columns, rows, first_frame, up)
+    choices = chosen["Stands"], chosen["Sinks"]
+    space = cell_up, ways, axes, origin.outputs["Vector"]
+    return _Table(vertices, *space, row, tile, frame_rate, columns, rows, first_frame, *choices)
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
@@ -145,152 +161,200 @@ def _at(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOA
     return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
 
 
-def _in_cells(graph: NodeGraph, table: _Table) -> Any:
-    """The root in cells of the table."""
-    inputs = {"Vector": graph.attribute(_ROOT, "FLOAT_VECTOR"), "Transform": table.from_scatter}
-    return graph.node("FunctionNodeTransformPoint", inputs).outputs["Vector"]
+@dataclass(frozen=True)
+class _Passes:
+    """The table with what its passes come to at the time, as fields.
+
+    Attributes
+    ----------
+    counted : geometry
+        The table, with what `latest` needs alone.
+    latest : int
+        Of each slot, the latest pass that has begun, or `_NOWHERE`.
+    vertices : geometry
+        The table, with what follows.
+    lean, further : vectors
+        Way of what is upright, for its length, in the scatter's space; and how much further what is worn down leans.
+    share : vector
+        Share of plants that are not worn down; how far they lie, and how much further the others do.
+    ground : vector
+        Slope and height of the ground [cells].
+    """
+
+    counted: Any
+    latest: Any
+    vertices: Any
+    lean: Any
+    further: Any
+    share: Any
+    ground: Any
 
 
-def _bent_passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> Any:
-    """The vertices of the table with what those passes come to that are the latest of their cells, or before these."""
-    active, *later = (graph.number(part) for part in graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR")))
+def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Passes:
+    active = graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR"))[0]
+    before = graph.accumulated(graph.compare("LESS_EQUAL", active, frame.socket), "INT").outputs["Leading"]
+    counted, (before,) = graph.captured(table.vertices, graph.number(before), kinds="INT")
+    index, first = graph.node("GeometryNodeInputIndex").outputs["Index"], graph.attribute(FIRST, "INT")
+    following = _at(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
+    of_slot = [graph.number(_at(graph, before.socket, at, "POINT", "INT")) for at in (first, following)]
+    count = of_slot[1] - of_slot[0]
+    latest = graph.number(first) + count - 1.0 + (1.0 - count.above(0.5)) * _NOWHERE
+
     start, end, passes = graph.parts(graph.attribute(TIMES, "FLOAT_VECTOR"))
     down, up, above = graph.parts(graph.attribute(PACE, "FLOAT_VECTOR"))
     reach, lasting, is_second = graph.parts(graph.attribute(SHARES, "FLOAT_VECTOR"))
     by = Pass(start, end, down, up, reach, lasting, passes, above)
     (standing, weight), (worn, _) = (bend(by, plant, frame, table.frame_rate, chance) for chance in (NO_ONE, EVERYONE))
-    remain = cover(passes, plant.half_after)
-    acts, ends = graph.compare("LESS_EQUAL", active.socket, frame.socket), []
-    for until in later:
-        ends.append(graph.both(acts, graph.compare("LESS_THAN", frame.socket, until.socket)))
-    held = graph.combined(standing.socket, worn.socket, remain.socket)
-    vertices = graph.store(table.vertices, _HELD, held, ends[1], "FLOAT_VECTOR")
-
-    before = graph.math("SUBTRACT", graph.node("GeometryNodeInputIndex").outputs["Index"], 1.0)
-    yields = (is_second * (1.0 - weight)).socket
-    older = _at(graph, graph.attribute(_HELD, "FLOAT_VECTOR"), before, "POINT")
-    older = graph.vector("MULTIPLY", older, graph.combined(yields, yields, 1.0))
-    vertices = graph.store(vertices, _OLDER, older, ends[0], "FLOAT_VECTOR")
-
+    held = graph.combined(standing.socket, worn.socket, cover(passes, plant.half_after).socket)
     pressed = ((frame - start) / (end - start).at_least(1.0)).within_one()
-    sink = graph.attribute(SINK, "FLOAT_VECTOR")
-    was = graph.scaled(_at(graph, sink, before, "POINT"), is_second.socket)
-    sunk = graph.vector("ADD", was, graph.scaled(graph.vector("SUBTRACT", sink, was), pressed.socket))
-    return graph.store(vertices, _SUNK, sunk, ends[0], "FLOAT_VECTOR")
+    fields, kinds = (graph.number(held), weight, pressed), ("VECTOR", "FLOAT", "FLOAT")
+    vertices, (held, weight, pressed) = graph.captured(table.vertices, *fields, kinds=kinds)
+
+    def earlier(value: Any) -> Any:
+        return graph.scaled(_at(graph, value, graph.math("SUBTRACT", index, 1.0), "POINT"), is_second.socket)
+
+    toward, sink = graph.attribute(LEAN, "FLOAT_VECTOR"), graph.attribute(SINK, "FLOAT_VECTOR")
+    *bends, remain = graph.parts(held.socket)
+    *older, remained = graph.parts(earlier(held.socket))
+    remained = remained + (1.0 - is_second)
+    remain = remained + (remain - remained) * weight
+    was, was_toward = earlier(sink), graph.scaled(earlier(toward), (1.0 - weight).socket)
+    ground = graph.vector("MULTIPLY_ADD", graph.vector("SUBTRACT", sink, was), pressed.socket, was)
+    steep = graph.vector("LENGTH", graph.vector("MULTIPLY", ground, (1.0, 1.0, 0.0)), output="Value")
+    level = (graph.number(graph.math("ARCTANGENT", steep)) / graph.number(steep)) * (-2.0 / pi)
+    tilt = graph.vector("MULTIPLY", graph.scaled(ground, level.socket), (1.0, 1.0, 0.0))
+    leans, shares = [], []
+    for now, then in zip(bends, older, strict=True):
+        way = graph.vector("MULTIPLY_ADD", was_toward, then.socket, graph.scaled(toward, now.socket))
+        way = graph.choose("VECTOR", table.stands, tilt, way)
+        share = graph.number(graph.vector("LENGTH", way, output="Value"))
+        sine = graph.number(graph.math("SINE", (share * (pi / 2)).socket))
+        x, y = (part * sine / share for part in graph.parts(way)[:2])
+        lean = graph.scaled(table.up, ((1.0 - sine * sine).root() - 1.0).socket)
+        for axis, part in zip(table.ways, (x, y), strict=False):
+            lean = graph.vector("MULTIPLY_ADD", axis, part.socket, lean)
+        leans.append(lean)
+        shares.append(share)
+    share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
+    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground
+    vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
+    return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
 
 
-def _latest(graph: NodeGraph, table: _Table, frame: Number) -> Any:
-    """The latest of the passes of a root that have begun, from 1 on; 0 without any."""
-    last = graph.combined(table.columns.socket, table.rows.socket, 0.0)
-    cell = graph.vector("MINIMUM", graph.vector("FLOOR", _in_cells(graph, table)), last)
-    cell = graph.vector("MAXIMUM", cell, (0.0, 0.0, 0.0))
-    tile = graph.vector("FLOOR", graph.scaled(cell, graph.math("DIVIDE", 1.0, table.tile.socket)))
-    number = graph.dot(tile, graph.combined(1.0, table.row.socket))
-    begin = graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number, "INT")
-    slot = graph.math("ADD", begin, graph.dot(cell, graph.combined(1.0, table.tile.socket)))
+@dataclass(frozen=True)
+class _Moved:
+    """How plants move, as fields: by `lean` times a point's height and by `shift`; how far they lie, from 0 to 1."""
 
-    active = graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR"))[0]
-    before = graph.accumulated(graph.compare("LESS_EQUAL", active, frame.socket), "INT").outputs["Leading"]
-    index = graph.node("GeometryNodeInputIndex").outputs["Index"]
-    first = graph.attribute(FIRST, "INT")
-    end = _at(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
-    begun = graph.number(_at(graph, before, end, "POINT", "INT")) - graph.number(
-        _at(graph, before, first, "POINT", "INT")
+    lean: Any
+    shift: Any
+    bent: Any
+    is_touched: Any
+
+
+def _given_way(
+    graph: NodeGraph,
+    table: _Table,
+    passes: _Passes,
+    geometry: Any,
+    domain: str,
+    root: Any,
+    move: Callable[[Any, _Moved], Any],
+    each: Any = None,
+) -> Any:
+    """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers."""
+    place = _in_cells(graph, table, root)
+    latest = graph.number(graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT"))
+    is_touched = 1.0 - latest.above(0.5 * _NOWHERE)
+    kinds = ("VECTOR", "INT", "BOOLEAN")
+    found, (root, latest, is_touched) = graph.captured(
+        geometry, graph.number(root), latest, is_touched, kinds=kinds, domain=domain
     )
-    latest = (graph.number(first) + begun) * begun.above(0.5)
-    return graph.at_index(table.vertices, latest.socket, slot, "INT")
+    total = graph.accumulated(is_touched.socket, "INT", domain).outputs["Total"]
+    touched = graph.number(graph.at_index(found, total, 0, "INT", domain))
 
-
-def _moved(graph: NodeGraph, table: _Table, chosen: Any) -> Any:
-    """How a touched root moves, as `_MOVED` has it."""
-    latest = graph.number(graph.attribute(_PASS, "INT")) - 1.0
-
-    def of_pass(name: str, index: Number = latest) -> Any:
-        return graph.at_index(table.vertices, graph.attribute(name, "FLOAT_VECTOR"), index.socket)
-
-    chance, ways = graph.number(graph.attribute(_CHANCE)), []
-    for bends, index in ((_HELD, latest), (_OLDER, latest - 1.0)):
-        standing, worn, remain = graph.parts(of_pass(bends))
-        angle = standing + (worn - standing) * chance.above(remain)
-        ways.append(graph.scaled(of_pass(LEAN, index), (angle * (pi / 2)).socket))
-    slope = of_pass(_SUNK)
-    steep = graph.vector("LENGTH", graph.vector("MULTIPLY", slope, (1.0, 1.0, 0.0)), output="Value")
-    level = (0.0 - graph.number(graph.math("ARCTANGENT", steep))) / graph.number(steep)
-    tilt = graph.choose("VECTOR", chosen["Stands"], graph.scaled(slope, level.socket), graph.vector("ADD", *ways))
-    beside = graph.vector("SUBTRACT", graph.vector("FRACTION", _in_cells(graph, table)), (0.5, 0.5, 0.0))
-    x, y, _ = graph.parts(beside)
-    height = graph.dot(slope, graph.combined(x.socket, y.socket, 1.0))
-    tilt = graph.parts(tilt)
-    return graph.combined(tilt[0].socket, tilt[1].socket, graph.choose("FLOAT", chosen["Sinks"], 0.0, height))
-
-
-def _stored(graph: NodeGraph, geometry: Any, domain: str, root: Any, latest: Any, moved: Any, each: Any = None) -> Any:
-    """The geometry with its roots and how the touched ones move, as attributes of a domain; `each` numbers plants."""
-    geometry = graph.store(geometry, _ROOT, root, True, "FLOAT_VECTOR", domain)
-    geometry = graph.store(geometry, _PASS, latest, True, "INT", domain)
-    is_touched = graph.compare("GREATER_THAN", graph.attribute(_PASS, "INT"), 0.5)
-    geometry = graph.store(geometry, _TOUCHED, is_touched, True, "BOOLEAN", domain)
-    is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
-    chance = next(socket for socket in random.outputs if socket.enabled)
-    geometry = graph.store(geometry, _CHANCE, chance, is_touched, domain=domain)
-    geometry = graph.store(geometry, _MOVED, moved, is_touched, "FLOAT_VECTOR", domain)
-    x, y, _ = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
-    bent = graph.math("MULTIPLY", graph.vector("LENGTH", graph.combined(x.socket, y.socket), output="Value"), 2.0 / pi)
-    return graph.store(geometry, BENT, bent, is_touched, domain=domain)
+    chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
+    lean, further, share, ground = (
+        graph.at_index(passes.vertices, value, latest.socket)
+        for value in (passes.lean, passes.further, passes.share, passes.ground)
+    )
+    remain, bent, bent_further = graph.parts(share)
+    is_worn = chance.above(remain)
+    lean = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean)
+    beside = [part.fraction() - 0.5 for part in _in_cells(graph, table, root.socket)]
+    slope_x, slope_y, level = graph.parts(ground)
+    height = level + slope_x * beside[0] + slope_y * beside[1]
+    height = graph.choose("FLOAT", table.sinks, 0.0, height.socket)
+    shift = graph.scaled(table.cell_up, height)
+    if domain != "INSTANCE":
+        shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
+    fields = (graph.number(lean), graph.number(shift), bent + bent_further * is_worn)
+    changed, captured = graph.captured(found, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
+    lean, shift, bent = (number.socket for number in captured)
+    moved = _Moved(lean, shift, bent, is_touched.socket)
+    changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
+    return graph.choose("GEOMETRY", touched.socket, geometry, move(changed, moved))
 
 
-def _lean_and_shift(graph: NodeGraph, table: _Table) -> tuple[Any, Number, Any]:
-    """Direction in which a root leans, its angle [rad] and the way that it goes, in the scatter's space."""
-    x, y, z = graph.parts(graph.attribute(_MOVED, "FLOAT_VECTOR"))
-    level = graph.combined(x.socket, y.socket, 0.0)
-    toward = graph.vector("NORMALIZE", _turned(graph, level, table.to_scatter))
-    angle = graph.number(graph.vector("LENGTH", level, output="Value"))
-    return toward, angle, _turned(graph, graph.combined(0.0, 0.0, z.socket), table.to_scatter)
+def _in_cells(graph: NodeGraph, table: _Table, root: Any) -> list[Number]:
+    """Column and row of a root, with fractions."""
+    origin = graph.parts(table.origin)[:2]
+    return [graph.number(graph.dot(root, axis)) + first for axis, first in zip(table.axes, origin, strict=True)]
 
 
-def _put(graph: NodeGraph, table: _Table, geometry: Any, domain: str, position: Any) -> Any:
-    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length."""
-    toward, angle, shift = _lean_and_shift(graph, table)
-    sine, cosine = (graph.number(graph.math(name, angle.socket)) for name in ("SINE", "COSINE"))
-    lean = graph.vector("ADD", graph.scaled(toward, sine.socket), graph.scaled(table.up, (cosine - 1.0).socket))
-    is_touched = graph.attribute(_TOUCHED, "BOOLEAN")
-    base = graph.dot(graph.attribute(_ROOT, "FLOAT_VECTOR"), table.up)
-    for name, value, kind in ((_LEAN, lean, "FLOAT_VECTOR"), (_SHIFT, shift, "FLOAT_VECTOR"), (_BASE, base, "FLOAT")):
-        geometry = graph.store(geometry, name, value, is_touched, kind, domain)
-    height = (graph.number(graph.dot(position, table.up)) - graph.number(graph.attribute(_BASE))).at_least(0.0)
-    aside = graph.scaled(graph.attribute(_LEAN, "FLOAT_VECTOR"), height.socket)
-    offset = graph.vector("ADD", aside, graph.attribute(_SHIFT, "FLOAT_VECTOR"))
-    return graph.put(geometry, is_touched, graph.vector("ADD", position, offset))
+def _slot(graph: NodeGraph, table: _Table, place: list[Number]) -> Number:
+    """Slot of a place in cells."""
+    lasts = table.columns, table.rows
+    column, row = (part.floor().at_most(last).at_least(0.0) for part, last in zip(place, lasts, strict=True))
+    tile_column, tile_row = ((part / table.tile).floor() for part in (column, row))
+    number = tile_row * table.row + tile_column
+    begin = graph.number(graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number.socket, "INT"))
+    return begin + row * table.tile + column
 
 
-def _instances_moved(graph: NodeGraph, table: _Table, geometry: Any, chosen: Any) -> Any:
+def _put(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _Moved) -> Any:
+    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length.
+
+    Those of others go nowhere, which takes less time than to leave them out.
+    """
+    height = graph.dot(position, table.up)
+    return graph.put(geometry, True, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
+
+
+def _instances_moved(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _Moved) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
-    toward, angle, shift = _lean_and_shift(graph, table)
-    own_rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
-    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": own_rotation})
-    stem = graph.choose("VECTOR", chosen["Stands"], table.up, turned.outputs["Vector"])
-    to_lie = graph.number(graph.math("ARCCOSINE", graph.dot(stem, toward)))
-    to_ground = {
-        "Axis": graph.vector("CROSS_PRODUCT", stem, toward),
-        "Angle": (angle * to_lie / (pi / 2)).socket,
-    }
-    rotation = graph.node("FunctionNodeAxisAngleToRotation", to_ground).outputs["Rotation"]
-    pivot = {"Rotation": rotation, "Pivot Point": graph.attribute(_ROOT, "FLOAT_VECTOR")}
-    for kind, change in (("Rotate", pivot), ("Translate", {"Translation": shift})):
-        touched = {"Instances": geometry, "Selection": graph.attribute(_TOUCHED, "BOOLEAN"), "Local Space": False}
-        geometry = graph.node(f"GeometryNode{kind}Instances", touched | change).outputs["Instances"]
+    rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
+    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": rotation})
+    stem, level = turned.outputs["Vector"], graph.scaled(table.up, graph.dot(moved.lean, table.up))
+    toward = graph.vector("NORMALIZE", graph.vector("SUBTRACT", moved.lean, level))
+    to_lie = graph.math("ARCCOSINE", graph.dot(stem, toward))
+    axes = (graph.vector("CROSS_PRODUCT", *ways) for ways in ((stem, toward), (table.up, moved.lean)))
+    to_lie = graph.number(graph.choose("FLOAT", table.stands, to_lie, pi / 2))
+    turn = {"Axis": graph.choose("VECTOR", table.stands, *axes), "Angle": (graph.number(moved.bent) * to_lie).socket}
+    rotation = graph.node("FunctionNodeAxisAngleToRotation", turn)
+    rotated, shifted = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
+    for node, name, value in (
+        (rotated, "Rotation", rotation.outputs["Rotation"]),
+        (shifted, "Translation", moved.shift),
+    ):
+        node.inputs["Local Space"].default_value = False
+        graph.link(geometry, node.inputs["Instances"])
+        graph.link(moved.is_touched, node.inputs["Selection"])
+        graph.link(value, node.inputs[name])
+        geometry = node.outputs["Instances"]
+    graph.link(position, rotated.inputs["Pivot Point"])
     return geometry
 
 
-def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position: Any, latest: Any, moved: Any) -> Any:
+def _loose_parts_moved(graph: NodeGraph, table: _Table, passes: _Passes, geometry: Any, position: Any) -> Any:
     """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices.
 
     What each sum takes is stored first: a sum within another is worked out twice.
     """
-    parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": geometry})
+    parts = graph.node("GeometryNodeSeparateComponents")
+    graph.link(geometry, parts.inputs["Geometry"])
     island = graph.node("GeometryNodeInputMeshIsland").outputs["Island Index"]
     mesh = graph.store(parts.outputs["Mesh"], _PART, island, True, "INT")
     part, low = graph.attribute(_PART, "INT"), graph.attribute(_LOW)
@@ -308,8 +372,9 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, geometry: Any, position:
         among = graph.number(low)
     share = graph.math("DIVIDE", 1.0, graph.separated(total(graph.combined(low)))[0])
     root = graph.scaled(total(graph.scaled(position, low)), share)
-    mesh = _stored(graph, mesh, "POINT", root, latest, moved, part)
-    mesh = _put(graph, table, mesh, "POINT", position)
+    mesh = graph.store(mesh, _ROOT, root, True, "FLOAT_VECTOR")
+    move, root = partial(_put, graph, table, position), graph.attribute(_ROOT, "FLOAT_VECTOR")
+    mesh = graph.forgotten(_given_way(graph, table, passes, mesh, "POINT", root, move, part), _ROOT, _PART, _LOW)
     joined = graph.node("GeometryNodeJoinGeometry")
     for piece in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
         graph.link(piece, joined.inputs["Geometry"])

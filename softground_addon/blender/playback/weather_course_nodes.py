@@ -294,7 +294,7 @@ class CourseNodes:
 
     def _keep(self, *vectors: Number) -> list[Any]:
         """Vectors as the rows keep them, all computed together."""
-        self.rows, captured = self.graph.captured(self.rows, *vectors, kind="VECTOR")
+        self.rows, captured = self.graph.captured(self.rows, *vectors, kinds="VECTOR")
         return [vector.socket for vector in captured]
 
     def _depth(self, remaining: Number, settling: Number, since: Number) -> Number:

@@ -351,6 +351,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "step, drying as they lie. Without hard ground in the shot, nothing changes",
         default=True,
     )
+    carried_amount: FloatProperty(
+        name="Carried",
+        description="How much sticks to soles, over what the ground's kind has: 2 is twice as much",
+        default=1.0, min=0.0, soft_max=3.0, max=10.0,
+    )  # fmt: skip
+    carried_reach: FloatProperty(
+        name="Reach",
+        description="How far soles carry it, over what its kind has: at 2, marks fade in about twice as many steps",
+        default=1.0, min=0.1, soft_max=5.0, max=20.0,
+    )  # fmt: skip
     steps_feel_weather: BoolProperty(
         name="Steps Feel Weather",
         description="Bake on the weathered ground: steps press fresh snow, and what the weather has left of earlier "

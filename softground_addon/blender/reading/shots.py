@@ -27,7 +27,7 @@ from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.arrays import Array
 from ...core.rig.mapping import RigMapping
-from ...core.settings import TIME_LIMIT, BakeSettings
+from ...core.settings import BakeSettings
 from ...core.weather.felt_weather import weathering_of
 from .. import ground_slots, setting_paths, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
@@ -230,7 +230,7 @@ def sample_characters(
     findings: list[Finding] | None = None,
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
-    check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s, set_by=TIME_LIMIT)
+    check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
     motions, rigs, units = [], [], wanted.units  # what was read is compared later, and is not all settings
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, character in enumerate(wanted.characters):

@@ -203,6 +203,7 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
     ]
     unsaid = {
         "marks": True,
+        "carried": (1.0, 1.0),
         "carve": True,
         "hard_grounds": (),
         "wet_grounds": (),

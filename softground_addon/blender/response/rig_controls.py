@@ -108,8 +108,8 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     keyed = [bone for bone in free if rig.is_shaped(bone) or bone in rig.keyed]
     if not free:
         raise InputError(
-            f"No bone of '{rig.name}' carries its whole body: choose the bone of the hips in Advanced > Body "
-            "Bones, or switch Tilt and Grounding off."
+            f"No bone of '{rig.name}' carries its whole body: choose the bone of the hips in Properties > "
+            "Physics > Body Bones, or switch Tilt and Grounding off."
         )
     return (keyed or free)[0]
 

@@ -20,7 +20,7 @@ from .rest_pose import map_by_rest_pose
 
 CHOOSE_CONTACTS = (
     "select the bones that touch the ground in Pose Mode, or vertices of the mesh in Edit Mode, and press Add Contact "
-    "in Advanced > Contacts"
+    "in Feet"
 )
 """Remedy if no feet are found."""
 

@@ -74,6 +74,10 @@ def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
     return obj.parent == armature and obj.parent_type == "BONE" and obj.parent_bone in armature.data.bones
 
 
+SHOD = 0.3
+"""A body stands on what hangs on its bones and is below it at rest, up to there, in its heights."""
+
+
 @sliced
 def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | None]:
     """The meshes on an armature that `meshes_on` names, or None where there is none.
@@ -103,6 +107,7 @@ def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | 
         yield
     if not pieces:
         return None
+    pieces = _shod(pieces, np.array(resolve(body).matrix_world)[2, :3])
     bones = tuple(dict.fromkeys(name for piece in pieces for name in piece.names))
     place = {name: number for number, name in enumerate(bones)}
     first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
@@ -137,6 +142,20 @@ class _Piece:
     weight: Array
     shapes: tuple[Shape, ...]
     hung: bool = False
+
+
+def _shod(pieces: list[_Piece], up: Array) -> list[_Piece]:
+    """Meshes, where what hangs on bones lower than all that is deformed is no prop, but shoes or hooves."""
+    heights = [piece.vertices @ up if len(piece.vertices) else np.full(1, np.inf) for piece in pieces]
+    deformed = np.concatenate([[], *(height for height, piece in zip(heights, pieces, strict=True) if not piece.hung)])
+    deformed = deformed[np.isfinite(deformed)]
+    if not len(deformed):
+        return pieces
+    low, top = deformed.min(), deformed.min() + SHOD * np.ptp(deformed)
+    return [
+        replace(piece, hung=piece.hung and bool(height.min() > low or height.max() > top))
+        for height, piece in zip(heights, pieces, strict=True)
+    ]
 
 
 def mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:

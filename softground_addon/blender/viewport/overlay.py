@@ -108,8 +108,13 @@ def draw_pressed() -> None:
 
 
 def corners_of(footprint: Footprint, pressing: session.Pressing, scene: bpy.types.Scene) -> Array:
-    """Triangles over the cells that a print touches, (6·N, 3), where they are in the scene [Blender units]."""
-    squares = overlay_shapes.squares(overlay_shapes.touched(footprint), footprint.cell_size, pressing.terrain)
+    """Triangles over the cells that a print touches, (6·N, 3), where they are in the scene [Blender units].
+
+    They have no gaps, and are raised by a cell: neither these nor the ground stipple them from afar.
+    """
+    cells, size = overlay_shapes.touched(footprint), footprint.cell_size
+    squares = overlay_shapes.squares(cells, size, pressing.terrain, side=1.0)
+    squares[:, 2] += size
     return in_scene(squares, scene, pressing.frame)
 
 

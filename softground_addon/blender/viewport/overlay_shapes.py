@@ -172,11 +172,13 @@ def _near(cells: Cells, reach: float) -> Cells:
     return np.stack([column, row], axis=-1) + corner
 
 
-def squares(cells: Cells, size: float, terrain: Terrain) -> Array:
-    """Two triangles for each of the cells (N, 2) of some size [m], (6·N, 3) [m]."""
+def squares(cells: Cells, size: float, terrain: Terrain, *, side: float = 0.84) -> Array:
+    """Two triangles for each of the cells (N, 2) of some size [m], (6·N, 3) [m].
+
+    They cover a part of its `side`: a narrow gap lets the cells be told apart.
+    """
     centres = (cells + 0.5) * size
-    half = 0.42 * size  # a narrow gap lets the cells be told apart
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]) * half
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]) * (side * size / 2)
     places = (centres[:, None] + corners).reshape(-1, 2)
     heights = np.repeat(terrain.heights(centres[:, 0], centres[:, 1]), 6) + LIFT
     return np.column_stack([places, np.nan_to_num(heights)])

@@ -77,16 +77,18 @@ def read(content: bytes) -> CapturedBody:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if any(member.file_size > _LARGEST for member in archive.infolist()):
-                raise InputError("the archive holds arrays of more than 500 MB: it is not an AMASS file")
+                raise InputError("the archive holds arrays of more than 500 MB: this is no AMASS file", "wrong_format")
         with np.load(io.BytesIO(content), allow_pickle=False) as held:
             rate = next((float(held[name]) for name in _RATES if name in held), np.nan)
             poses, way = _poses(held, rate), _table(held["trans"], rate, 3)
     except InputError:
         raise
     except Exception as error:  # NumPy and zlib raise of every kind at damaged archives
-        raise InputError(f"this is not an AMASS file ({error}): it needs poses, trans and mocap_framerate") from error
+        raise InputError(f"not an AMASS file ({error}): it lacks poses, trans or their rate", "wrong_format") from error
     if way.shape != (len(poses), 3) or not (np.isfinite(way).all() and np.isfinite(poses).all()):
-        raise InputError("the AMASS file contradicts itself: poses and trans differ in length, or hold no numbers")
+        raise InputError(
+            "the AMASS file contradicts itself: poses and trans differ, or hold no numbers", "damaged_file"
+        )
     return CapturedBody(_joints(poses, way), rate)
 
 
@@ -96,7 +98,7 @@ def _poses(held: Any, rate: float) -> Array:
     parts = ["poses"] if "poses" in held else ["root_orient", "pose_body"]
     poses = np.concatenate([_table(held[part], rate, values) for part in parts], axis=1)
     if poses.shape[1] < values or not len(poses):
-        raise InputError(f"the AMASS file has poses of shape {poses.shape}: (frames, 66 or more) are needed")
+        raise InputError(f"the AMASS file has poses of shape {poses.shape}, not (frames, 66 or more)", "wrong_format")
     return poses[:, :values].reshape(len(poses), -1, 3)
 
 

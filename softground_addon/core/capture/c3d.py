@@ -77,7 +77,7 @@ def _told_as_damage() -> Iterator[None]:
     try:
         yield
     except (struct.error, ValueError, IndexError, OverflowError) as error:
-        raise InputError(f"the C3D file is damaged ({error}): export it again") from error
+        raise InputError(f"the C3D file is damaged ({error}): export it again", "damaged_file") from error
 
 
 def _read(content: bytes) -> Capture:
@@ -100,13 +100,13 @@ def _read(content: bytes) -> Capture:
 def _parameters(content: bytes) -> tuple[Parameters, _Numbers]:
     """The parameter section, and the number format of the file."""
     if len(content) < 2 * _BLOCK or content[1] != _KEY:
-        raise InputError("this is not a C3D file: it lacks the mark of one in its second byte")
+        raise InputError("this is not a C3D file: it lacks the mark of one in its second byte", "wrong_format")
     start = (content[0] - 1) * _BLOCK
     if start < 0 or start + 4 > len(content):
-        raise InputError("the C3D file is cut short before its parameters: copy or export it again")
+        raise InputError("the C3D file is cut short before its parameters: copy or export it again", "cut_short")
     numbers = _Numbers(content[start + 3])
     if numbers.processor not in (_INTEL, _DEC, _SGI):
-        raise InputError(f"the C3D file is written for an unknown processor ({numbers.processor}): export it again")
+        raise ValueError(f"of an unknown processor, {numbers.processor}")
     end = min(len(content), start + max(content[start + 2], 1) * _BLOCK)
     parameters, groups = Parameters(), dict[int, str]()
     waiting: list[tuple[int, str, Any]] = []  # parameters may come before the group that they belong to
@@ -138,7 +138,7 @@ def _value(content: bytes, place: int, numbers: _Numbers) -> Any:
     first = place + 2 + count
     part = content[first : first + size * abs(kind)]
     if kind not in (-1, 1, 2, 4) or len(part) < size * abs(kind):
-        raise InputError("the C3D file is damaged in its parameters: export it again")
+        raise InputError("the C3D file is damaged in its parameters: export it again", "damaged_file")
     if kind == -1:
         width = shape[0] if shape else 1
         return [part[at : at + width].decode("latin-1").strip() for at in range(0, size, width)] if width else []
@@ -204,7 +204,8 @@ def _frames(content: bytes, layout: _Layout, numbers: _Numbers) -> tuple[Array, 
     if layout.frames < 1 or layout.start < _BLOCK or values < 1 or len(section) < size:
         raise InputError(
             f"the C3D file is cut short: {layout.frames} frames of {values * width} bytes should follow, "
-            f"{max(len(section), 0)} bytes do; copy or export it again"
+            f"{max(len(section), 0)} bytes do; copy or export it again",
+            "cut_short",
         )
     check_length(layout.frames, layout.rate)
     table = (numbers.reals(section) if real else numbers.integers(section)).reshape(layout.frames, values)

@@ -78,20 +78,17 @@ class Capture:
 
     def __post_init__(self) -> None:
         if not self.labels or not len(self.points):
-            raise InputError("the file holds no markers: record or export it with its trajectories")
+            raise InputError("the file holds no markers: record or export it with its trajectories", "no_markers")
 
 
 def check_length(frames: int, rate: float) -> None:
     """Raise InputError for more frames than `MOST_FRAMES`, or a rate [Hz] beyond `RATES`; before arrays are made."""
     low, high = RATES
     if not low <= rate <= high:
-        raise InputError(
-            f"the file has a frame rate of {rate:g} Hz, not {low:g} to {high:,.0f}: export it again with it"
-        )
+        raise InputError(f"a frame rate of {rate:g} Hz is not {low:g} to {high:,.0f} Hz", "frame_rate", rate=rate)
     if frames > MOST_FRAMES:
-        raise InputError(
-            f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export a part of it, or fewer frames per second"
-        )
+        message = f"the file has {frames:,} frames, over {MOST_FRAMES:,}: export fewer"
+        raise InputError(message, "too_many_frames", frames=frames)
 
 
 def bridged(path: Array) -> Array:
@@ -119,4 +116,6 @@ def metres(unit: str) -> float:
     try:
         return LENGTHS[unit.strip().lower()]
     except KeyError:
-        raise InputError(f"the file's unit of length is {unit!r}: export it in {', '.join(LENGTHS)}") from None
+        raise InputError(
+            f"the unit of length is {unit!r}, not {', '.join(LENGTHS)}", "unknown_unit", unit=unit
+        ) from None

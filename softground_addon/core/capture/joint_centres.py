@@ -85,7 +85,10 @@ def captured_body(capture: Capture, up: str | None = None) -> CapturedBody:
     if missing:
         raise InputError(
             f"no markers for {', '.join(missing)} among {', '.join(capture.labels[:12])}...: name them as Plug-in "
-            "Gait, OpenSim, OpenCap or Qualisys do, or export joint centres"
+            "Gait, OpenSim, OpenCap or Qualisys do, or export joint centres",
+            "missing_markers",
+            missing=missing,
+            labels=capture.labels,
         )
     for side in "lr":
         joints |= {f"{joint}_{side}": path for joint, path in _arm(points, side, _leg_length(joints)).items()}

@@ -60,7 +60,7 @@ class Skeleton:
     bones : tuple of Bone
         Parents before their children.
     poses : (F, B, 4, 4) float array
-        Bone to world [m].
+        Bone to world [m]: y from its head to its tail, x as `Bone.x_axis`.
     rate : float
         Frames per second [Hz].
     """
@@ -162,7 +162,7 @@ def standing(body: CapturedBody) -> dict[str, Array]:
     thigh, shank = _length(joints, "hip", "knee"), _length(joints, "knee", "ankle")
     leg = thigh + shank
     if not leg > 0:
-        raise InputError("the captured legs have no length: the markers of hips, knees and ankles are in one place")
+        raise InputError("the legs have no length: hips, knees and ankles are in one place", "legs_without_length")
     half = float(np.median(np.linalg.norm(joints["hip_l"] - joints["hip_r"], axis=1))) / 2
     floor = _floor(joints, leg)
     rest: dict[str, Array] = {}

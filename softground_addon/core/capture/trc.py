@@ -27,21 +27,19 @@ def read(content: bytes) -> Capture:
     """
     lines = content.decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if len(lines) <= _HEADER_LINES or "PathFileType" not in lines[0]:
-        raise InputError('this is no TRC file: its first line lacks "PathFileType"')
+        raise InputError('this is no TRC file: its first line lacks "PathFileType"', "wrong_format")
     about = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [name.strip() for name in lines[3].split("\t")[2:] if name.strip()]
     if not labels:
-        raise InputError("the TRC file names no markers in its fourth line: export it again")
+        raise InputError("the TRC file names no markers in its fourth line: export it again", "no_markers")
     rows = [line for line in lines[_HEADER_LINES:] if line.strip()]
     promised, rate = (_number(about.get(what, "")) for what in ("NumFrames", "DataRate"))
     if len(rows) < promised:
-        raise InputError(
-            f"the TRC file is cut short: it holds {len(rows)} of {promised:.0f} frames; copy or export it again"
-        )
+        raise InputError(f"the TRC file is cut short: {len(rows)} of {promised:.0f} frames; copy it again", "cut_short")
     check_length(len(rows), rate)
     width = 2 + 3 * len(labels)
     if len(rows) * width > max(len(content), _SPARSE):
-        raise InputError(f"the TRC file names {len(labels):,} markers and holds far fewer: export it again")
+        raise InputError(f"the TRC file holds far fewer than {len(labels):,} markers: export it again", "damaged_file")
     table = np.full((len(rows), width), np.nan)
     for values, row in zip(table, rows, strict=True):
         cells = (row.split("\t") if "\t" in row else row.split())[:width]

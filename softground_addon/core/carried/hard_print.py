@@ -1,4 +1,7 @@
-"""A sole on a hard floor: a small grid that is fixed to it, how hard it presses, and where it lies on the floor."""
+"""A sole on a hard floor: a small grid that is fixed to it, how hard it presses, and where it lies on the floor.
+
+What prints by whatever faces down, such as a wheel, presses a grid that lies on the floor.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,18 @@ import numpy as np
 
 from ..ground.hard_ground import HardOnSoft, up_to
 from ..ground.terrain import SAME_LAYER
+from ..motion.props import Prop, posed
 from ..motion.sole_motion import Sole
 from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import inverse
 from ..soles.patch_maps import Nodes, covered_fraction, distance_beyond
+from ..soles.undersides import lowest_surface
 from .film import zone_of
 
 ALONG_SOLE = 14
 """Nodes of the grid along a sole: 2 cm for an adult. The outline between them is that of the distances to it."""
+ACROSS_PROP = 24
+"""Nodes along a cube as large as a wheel, a ball or a hand."""
 BEDDING = 1e7
 """Stiffness of a sole [Pa/m]: 2 cm of midsole of 0.2 MPa. It gives 4 mm under a person, which forgives poses."""
 CLEARANCE = 0.3e-3
@@ -161,6 +168,72 @@ def laid(grid: SoleGrid, poses: Array, force: Array, terrain: HardOnSoft, tolera
     position = (weight[..., None] * places).sum(axis=0) / weight.sum(axis=0)[:, None]
     x, y, z = position.T
     position[:, 2] = _floor(terrain, x, y, z + tolerance) + CLEARANCE
+    return _pressed(grid, position, pressure)
+
+
+def prop_spacing(prop: Prop) -> float:
+    """Distance between the nodes that a body presses [m]."""
+    return prop.size / ACROSS_PROP
+
+
+def swept(
+    prop: Prop,
+    poses: Array,
+    force: Array,
+    terrain: HardOnSoft,
+    tolerance: float,
+    others: tuple[bool, bool] = (False, False),
+) -> tuple[SoleGrid, HardPrint] | None:
+    """What a body sweeps on hard floors as it rolls, slides or rests there; None where no floor is under it.
+
+    Parameters
+    ----------
+    poses : (T, 4, 4) float array
+    force, terrain, tolerance
+        As of `laid`.
+    others : (bool, bool), optional
+        True if the first and the last pose are those of prints before and after: what they press most is of these.
+
+    Returns
+    -------
+    SoleGrid
+        Nodes on the floor, all in the first zone; along the way of the body, from its left side.
+    HardPrint
+    """
+    spacing, bodies = prop_spacing(prop), posed(prop.vertices, poses)
+    near = bodies[..., 2] < bodies[..., 2].min(axis=1, keepdims=True) + 2 * spacing + prop.give
+    low, high = (bodies[near, :2].min(axis=0) - spacing, bodies[near, :2].max(axis=0) + spacing)
+    columns, rows = np.ceil((high - low) / spacing).astype(int) + 1
+    lower = np.stack([lowest_surface(body, prop.triangles, low, (rows, columns), spacing).ravel() for body in bodies])
+    y, x = (
+        low[axis] + spacing * index.ravel() for axis, index in zip((1, 0), np.indices((rows, columns)), strict=True)
+    )
+    floor = _floor(terrain, x, y, lower.min(axis=0) + tolerance)
+    if np.isnan(floor).all():
+        return None
+    gap = np.where(np.isnan(floor), np.inf, lower - floor)
+    pressure = bedded(gap, np.full(len(x), spacing**2), force)
+    most = pressure.argmax(axis=0)
+    pressure *= ~((most == 0) & others[0] | (most == len(poses) - 1) & others[1])
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    way = poses[-1, :2, 3] - poses[0, :2, 3]
+    ahead = way / np.linalg.norm(way) if np.linalg.norm(way) > spacing else np.array((1.0, 0.0))
+    offset = np.stack([x, y], axis=-1) - poses[0, :2, 3]
+    presses = pressure.max(axis=0) > 0
+    grid = SoleGrid(
+        np.zeros((len(x), 3)),
+        np.zeros(len(x), np.intp),
+        np.stack([offset @ ahead, offset @ (-ahead[1], ahead[0]), spacing * (0.5 - presses)], axis=-1),
+        presses * spacing**2,
+        np.zeros(len(x), np.intp),
+        corner[:, None] + np.array([0, 1, columns + 1, columns]),
+        spacing,
+    )
+    return grid, _pressed(grid, np.stack([x, y, floor + CLEARANCE], axis=-1), pressure)
+
+
+def _pressed(grid: SoleGrid, position: Array, pressure: Array) -> HardPrint:
+    """The print of pressures (T, N) on nodes that lie at positions (N, 3)."""
     largest = pressure.max(axis=0)
     height = position[grid.faces, 2]
     is_even = np.ptp(height, axis=1) <= STEEPEST * grid.spacing  # false where a corner has no floor

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from types import MappingProxyType
@@ -20,13 +20,15 @@ from ..ground.terrain import SAME_LAYER
 from ..imprints.sole_points import flat_pose
 from ..loads.contacts import LEAVE_HEIGHT, REST_SPEED
 from ..loads.estimate import CharacterLoads
+from ..motion.sole_motion import Sole, SoleMotion
 from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
+from ..record.edits import LONGEST_SHIFT
 from ..record.record import EditableStep
 from .film import ZONES, CarriedMass, Meeting, share_left
 from .floor_steps import FloorSteps, SoleOnFloors
-from .hard_print import HardPrint, SoleGrid, laid, sole_grid
+from .hard_print import HardPrint, SoleGrid, laid, prop_spacing, sole_grid, swept
 
 LOOKED_AT = 32
 """Steps of a contact at which it is looked at, about."""
@@ -53,6 +55,8 @@ class Marks:
         Depth of the grooves of the sole [m].
     step : (V,) int array
         Number of the contact with a hard floor, in the order of time for each sole.
+    pad : (V, 3) float array
+        Under bare feet, as of `relief.tread.PADS`: ahead over length, left of a right foot over breadth, breadth [m].
     share : (V,) float array
         Of the film on the sole that is left there.
     zone : (V,) int array
@@ -68,6 +72,7 @@ class Marks:
     area: Array
     sole: Array
     tread: Array
+    pad: Array
     step: NDArray[np.intp]
     share: Array
     zone: NDArray[np.intp]
@@ -85,17 +90,34 @@ class Marks:
 class _Contact:
     """A contact of a sole with a hard floor: where it lies, its slide in sole lengths, frames, and what wets it."""
 
+    grid: SoleGrid
     laid: HardPrint
     slid: float
     frames: Array
     wet: str
 
 
+@dataclass(frozen=True)
+class _Under:
+    """Underside of a sole: the depth of its grooves [m], and itself where it is bare."""
+
+    tread: float
+    bare: Sole | None
+
+    def pads(self, places: Array) -> Array:
+        """Places (N, 3) of `SoleGrid` as `Marks.pad` has them."""
+        if self.bare is None:
+            return np.zeros_like(places)
+        along, across, _ = places.T
+        left = across * (-1.0 if self.bare.side == "L" else 1.0) / self.bare.breadth
+        return np.stack([along / self.bare.length - 0.5, left, np.full(len(places), self.bare.breadth)], axis=-1)
+
+
 _Mark = dict[str, Any]
 """The faces of a mark, and the values of its vertices, as `Marks` has them."""
 _NOTHING: _Mark = {
     **dict.fromkeys(("birth", "mass", "area", "tread", "share"), np.zeros(0)),
-    **dict.fromkeys(("position", "sole"), np.zeros((0, 3))),
+    **dict.fromkeys(("position", "sole", "pad"), np.zeros((0, 3))),
     **{"zone": np.zeros(0, np.intp), "faces": np.zeros((0, 4), np.intp)},
 }
 
@@ -109,6 +131,8 @@ def marks_of(
     surface: str,
     shed: Mapping[int, float] = MappingProxyType({}),
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
+    bare: Collection[tuple[str, str]] = (),
+    carried: tuple[float, float] = (1.0, 1.0),
     brought: Mapping[str, float] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
@@ -125,6 +149,10 @@ def marks_of(
         Volume that each step sheds in the air, by its number [m³].
     treads : mapping of (str, str) to float, optional
         Depth of the grooves of soles that have some, by character and sole [m].
+    bare : collection of (str, str), optional
+        Feet without shoes, whose toes show.
+    carried : (float, float), optional
+        How much sticks and how far it goes, as of `CarriedFilm.scaled`.
     brought : mapping of str to float, optional
         Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
     """
@@ -135,7 +163,7 @@ def marks_of(
     sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
-    laid_out: list[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]] = []
+    laid_out: list[tuple[Sequence[_Contact], SoleOnFloors, _Under]] = []
     for character in loads:
         for index, motion in enumerate(character.motion.soles):
             yield
@@ -143,43 +171,51 @@ def marks_of(
             dirty = brought.get(of[0], 0.0)
             on_soft = any((step.baked.character, step.baked.sole) == of for step in steps)
             takes = on_soft or dirty or terrain.wet
-            if not takes or motion.sole.prop is not None or hard is None or not hard[:, index].any():
+            if not takes or hard is None or not hard[:, index].any():
                 continue
-            grid = sole_grid(motion.sole, flat_pose(motion.transforms))
+            grid = None if motion.sole.prop else sole_grid(motion.sole, flat_pose(motion.transforms))
             contacts = []
-            for during in _pieces(hard[:, index], slid := _slid(character, index)):
-                contacts.append(_contact(character, index, grid, during, slid, terrain))
+            slid, turned = _slid(character, index), _turned(motion)
+            for during in _pieces(hard[:, index], slid + turned):
+                contacts += _contacts(character, index, grid, during, slid, terrain, hard[:, index])
                 yield
-            sole = SoleOnFloors(of, _by_zone(grid, grid.area), float(character.motion.frames[-1]), dirty, (), ())
-            laid_out.append((grid, contacts, sole, treads.get(of, 0.0)))
-    whole = [_of_kind(kind, surface, laid_out, steps, shed) for kind in sticking]
+            if contacts:
+                areas = np.max([_by_zone(each.grid, each.grid.area) for each in contacts], axis=0)
+                sole = SoleOnFloors(of, areas, float(character.motion.frames[-1]), dirty, (), ())
+                laid_out.append((contacts, sole, _Under(treads.get(of, 0.0), motion.sole if of in bare else None)))
+    whole = [_of_kind(kind, FloorSteps(kind.name, surface, (), carried), laid_out, steps, shed) for kind in sticking]
     return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
 
 def _of_kind(
     kind: SurfaceRecord | Liquid,
-    ground: str,
-    laid_out: Sequence[tuple[SoleGrid, Sequence[_Contact], SoleOnFloors, float]],
+    floors: FloorSteps,
+    laid_out: Sequence[tuple[Sequence[_Contact], SoleOnFloors, _Under]],
     steps: Sequence[EditableStep],
     shed: Mapping[int, float],
 ) -> Marks:
-    """All marks of one kind, of steps that are muted, too: those weigh nothing."""
-    assert kind.carried is not None
+    """All marks of one kind, and those that there would be if steps on soft ground are muted no more, or shifted."""
     parts: list[_Mark] = []
     soles = []
-    for grid, contacts, sole, tread in laid_out:
+    for contacts, sole, under in laid_out:
         meetings, marks = [], []
         for contact in sorted(contacts, key=lambda each: each.frames[0]):
             is_wet = contact.wet == kind.name
-            share = share_left(contact.laid.pressure, kind.carried, contact.slid)
-            of_zones = None if is_wet else _by_zone(grid, share * grid.area) / np.maximum(sole.areas, 1e-300)
-            meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), of_zones))
+            share = share_left(contact.laid.pressure, floors.carried, contact.slid)
+            of_zones = _by_zone(contact.grid, share * contact.grid.area) / np.maximum(sole.areas, 1e-300)
+            meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), None if is_wet else of_zones))
             marks.append(-1 if is_wet else len(parts))
-            parts += [] if is_wet else [_mark(grid, contact, share, tread)]
-        dirty = sole.dirty if kind.name == ground else 0.0
+            parts += [] if is_wet else [_mark(contact, share, under)]
+        dirty = sole.dirty if kind.name == floors.ground else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
-    floors = FloorSteps(kind.name, ground, tuple(soles))
-    at_most, _ = floors.films([replace(step, footprint=step.baked) for step in steps if not step.is_copy], {})
+    floors = replace(floors, soles=tuple(soles))
+    baked = [replace(step, footprint=step.baked) for step in steps if not step.is_copy]
+    at_most, _ = floors.films(baked, {})
+    for sole in soles:
+        ends = [meeting.frame for meeting in floors.soft_meetings(replace(sole, last_frame=np.inf), baked, {})]
+        for number, meeting in zip(sole.marks, sole.meetings, strict=True):
+            if number >= 0 and any(abs(end - meeting.frame) <= LONGEST_SHIFT for end in ends):
+                at_most[number] = np.ones(len(ZONES))
     weighs = [bool((at_most[n][part["zone"]] * part["share"]).any()) for n, part in enumerate(parts)]
     numbers = np.append(np.where(weighs, np.cumsum(weighs) - 1, -1), -1).astype(int)
     soles = [replace(sole, marks=tuple(numbers[list(sole.marks)].tolist())) for sole in soles]
@@ -194,38 +230,84 @@ def _slid(character: CharacterLoads, index: int) -> Array:
     return np.cumsum(speed * slides) * motion.time_step / motion.soles[index].sole.length
 
 
+def _turned(motion: SoleMotion) -> Array:
+    """Turns up to each step, (N,), of a body that may roll."""
+    if motion.sole.prop is None:
+        return np.zeros(len(motion.transforms))
+    rotation = motion.transforms[:, 0, :3, :3]
+    cosine = (np.einsum("nij,nij->n", rotation[1:], rotation[:-1]) - 1.0) / 2.0
+    return np.concatenate([[0.0], np.cumsum(np.arccos(np.clip(cosine, -1.0, 1.0)))]) / (2 * np.pi)
+
+
 def _pieces(hard: NDArray[np.bool_], slid: Array) -> Iterator[slice]:
-    """The contacts of a sole with hard floors, cut where it has slid on by its length."""
+    """The contacts of a sole with hard floors, cut where it has slid on by its length or turned once."""
     for first, end in zip(*runs(hard), strict=True):
         cuts = first + 1 + np.flatnonzero(np.diff(np.floor(slid[first:end] - slid[first])))
         yield from map(slice, (first, *cuts), (*cuts, end))
 
 
-def _contact(
-    character: CharacterLoads, index: int, grid: SoleGrid, during: slice, slid: Array, terrain: HardOnSoft
-) -> _Contact:
+def _along(
+    place: Array, during: slice, on_hard: NDArray[np.bool_], spacing: float
+) -> tuple[NDArray[np.intp], tuple[bool, bool]]:
+    """Steps at which a body is looked at, about one for each spacing of its way, with one before and one after of the
+    pieces there, and whether there are.
+    """
+    way = np.linalg.norm(np.diff(place[during], axis=0), axis=1)
+    every = max(1, int(spacing / max(way.mean(), 1e-9))) if len(way) else 1
+    every = min(every, max(1, (during.stop - during.start) // LOOKED_AT))
+    before = bool(during.start > 0 and on_hard[during.start - 1])
+    after = bool(during.stop < len(on_hard) and on_hard[during.stop])
+    inside = {*range(during.start, during.stop, every), during.stop - 1}
+    ends = [during.start - 1] * before + [during.stop] * after
+    return np.array(sorted(inside.union(ends))), (before, after)
+
+
+def _contacts(
+    character: CharacterLoads,
+    index: int,
+    grid: SoleGrid | None,
+    during: slice,
+    slid: Array,
+    terrain: HardOnSoft,
+    on_hard: NDArray[np.bool_],
+) -> list[_Contact]:
+    """One contact of a sole with a grid or of a body, or none where no floor is under it."""
     motion = character.motion
-    steps = np.arange(during.start, during.stop, max(1, (during.stop - during.start) // LOOKED_AT))
-    poses = motion.soles[index].transforms[steps].copy()
+    sole, prop = motion.soles[index], motion.soles[index].sole.prop
+    steps, others = (
+        np.arange(during.start, during.stop, max(1, (during.stop - during.start) // LOOKED_AT)),
+        (False, False),
+    )
+    if prop is not None:
+        steps, others = _along(sole.transforms[:, 0, :3, 3], during, on_hard, prop_spacing(prop))
+    poses = sole.transforms[steps].copy()
     lift = character.contacts.offset[index] * character.contacts.normal[steps, index]
     poses[..., :3, 3] -= lift[:, None]  # the float or sink of the source
     force, tolerance = normal_force(character, index)[steps], LEAVE_HEIGHT * motion.leg_length
-    print_ = laid(grid, poses, force, terrain, tolerance)
+    if prop is not None:
+        of_body = swept(prop, poses[:, 0], force, terrain, tolerance, others)
+        if of_body is None:
+            return []
+        grid, print_ = of_body
+    else:
+        assert grid is not None
+        print_ = laid(grid, poses, force, terrain, tolerance)
     x, y, z = print_.position.T
     weight = print_.pressure * grid.area
     wet = ""
     for liquid, floor in terrain.wet.items():
         on_it = np.abs(floor.heights(x, y, z) - z) < SAME_LAYER
         wet = liquid if weight[on_it].sum() > 0.5 * weight.sum() else wet
-    return _Contact(print_, float(slid[during.stop - 1] - slid[during.start]), motion.frames[steps], wet)
+    return [_Contact(grid, print_, float(slid[during.stop - 1] - slid[during.start]), motion.frames[steps], wet)]
 
 
 def _by_zone(grid: SoleGrid, values: Array) -> Array:
     return np.asarray(np.bincount(grid.zone, values, len(ZONES)), float)
 
 
-def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float) -> _Mark:
-    """The mark of one contact that leaves a share at each node of the grid."""
+def _mark(contact: _Contact, share: Array, under: _Under) -> _Mark:
+    """The mark of one contact that leaves a share at each node of its grid."""
+    grid = contact.grid
     used, faces = np.unique(contact.laid.faces, return_inverse=True)
     return {
         "faces": faces.reshape(-1, 4),
@@ -234,7 +316,8 @@ def _mark(grid: SoleGrid, contact: _Contact, share: Array, tread: float) -> _Mar
         "mass": np.zeros(len(used)),
         "area": grid.area[used],
         "sole": grid.sole[used],
-        "tread": np.full(len(used), tread),
+        "tread": np.full(len(used), under.tread),
+        "pad": under.pads(grid.sole[used]),
         "share": share[used],
         "zone": grid.zone[used],
     }

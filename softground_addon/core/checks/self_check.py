@@ -83,7 +83,7 @@ def self_check(
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
-        findings.append(Finding("rim_off_ground", "note", message, "make the ground larger."))
+        findings.append(Finding("rim_off_ground", "note", message, "make the ground larger.", {"volume": unplaced}))
     return findings
 
 
@@ -92,7 +92,8 @@ def no_motion(motion: CharacterMotion) -> Finding | None:
     if motion.centre is not None or not motion.stands_still:
         return None
     remedy = "check that its action has keys in them, is assigned with its slot, and is not muted."
-    return Finding("no_motion", "warning", f"'{motion.name}' does not move in these frames", remedy)
+    said = f"'{motion.name}' does not move in these frames"
+    return Finding("no_motion", "warning", said, remedy, {"character": motion.name})
 
 
 def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
@@ -106,8 +107,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "no_print",
             "error",
             f"'{motion.name}' leaves no print in these frames",
-            "check in Advanced > Contacts that its soles are what touches the ground, and in the viewport "
-            "that they face down.",
+            "check that its soles are what touches the ground, and that they face down.",
+            {"character": motion.name},
         )
     else:
         pressing = np.where(hard, 0.0, character.forces.forces[..., 2])
@@ -119,7 +120,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
                 "sole_without_print",
                 "warning",
                 f"{', '.join(map(repr, mute))} of '{motion.name}' bears load and leaves no print",
-                "check that its sole faces down, and that its bone in Contacts is right.",
+                "check that its sole faces down, and that its bone is the right one.",
+                {"character": motion.name, "soles": mute},
             )
     missed = missed_steps(motion, character.contacts)
     if missed:
@@ -131,7 +133,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "warning",
             f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while planted, and print over "
             "each other.",
-            "Press Walk Ahead, or use the animation with its root motion.",
+            "Use the animation with its root motion.",
+            {"character": motion.name, "speed": round(belt, 3)},
         )
 
 
@@ -144,6 +147,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "warning",
             f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long",
             f"set the cell size to {length / ENOUGH_CELLS * 100:.2g} cm to see their shape.",
+            {"character": motion.name, "cell_size": float(f"{length / ENOUGH_CELLS:.2g}")},
         )
     if motion.centre is not None:
         return  # a prop has no legs to go by
@@ -154,8 +158,9 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "unit_scale",
             "error" if wrong_unit(motion.stature) else "warning",
             f"'{motion.name}' is {size} tall: its file is in {unit}.",
-            f"Press Scale by {scale_to_metres(motion.stature, captured=captured):g}, or leave it if the size is "
+            f"Scale it by {(factor := scale_to_metres(motion.stature, captured=captured)):g}, or leave it if that is "
             "intended.",
+            {"character": motion.name, "factor": factor},
         )
         return  # with its size, the mass that suits it changes
     likely, by = likely_mass(motion.skin.mass if motion.skin else 0.0, motion.size, two_legs=motion.two_legs)
@@ -166,7 +171,8 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "mass_of_size",
             "warning",
             f"'{motion.name}' weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
-            "Set Mass.",
+            "Give it its mass.",
+            {"character": motion.name, "mass": motion.mass, "likely": float(f"{likely:.2g}")},
         )
 
 
@@ -185,6 +191,7 @@ def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
             "warning",
             f"'{high}' of '{motion.name}' is planted {apart * 100:.1f} cm higher above the ground than '{low}'",
             "check that both soles have the right bones, and the ground level under them.",
+            {"character": motion.name, "high": high, "low": low, "apart": round(apart, 4)},
         )
 
 
@@ -214,6 +221,7 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
             f"'{motion.name}' walks about {factor:.1f} times slower than the length of its legs suggests",
             "set the frame rate of the scene to that of the animation, or leave it if slow motion, or a model of a "
             "larger body, is intended.",
+            {"character": motion.name, "factor": round(factor, 3)},
         )
 
 
@@ -248,6 +256,7 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
             f"{which} over the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
             "the sole on it",
             "extend the ground beyond the steps.",
+            {"character": motion.name, "steps": count, "frame": first, "share": round(least, 3)},
         )
     ]
 
@@ -258,4 +267,5 @@ def bottomed_out(footprints: Sequence[Footprint], material: GroundMaterial, grou
     if not count or count < MANY_AT_BOTTOM * len(footprints):
         return []
     message = f"{count} of {len(footprints)} steps press '{ground}' as far as it goes, {material.deepest * 100:.3g} cm"
-    return [Finding("bottomed_out", "warning", message, "make the layer deeper, or choose a firmer ground.")]
+    facts = {"steps": int(count), "deepest": material.deepest}
+    return [Finding("bottomed_out", "warning", message, "make the layer deeper, or choose a firmer ground.", facts)]

@@ -19,6 +19,7 @@ from ..numerics.slices import Slices
 from ..record.footprints import Footprint
 from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
+from .contact_check import contact_check
 
 OFF_SKIN = 0.012
 """Largest distance of the ground from resting skin, in body heights: 2 cm for an adult, the compliance of a shoe."""
@@ -66,6 +67,7 @@ def skin_check(
                 "error",
                 f"The skin of '{motion.name}' rests {abs(resting_height) * 100:.1f} cm {side} '{ground}'",
                 f"move the ground {ground_way} by as much, or the character {body_way}.",
+                {"character": motion.name, "height": round(resting_height, 4)},
             )
         )
     else:
@@ -74,7 +76,9 @@ def skin_check(
     touching = _Touching(skin, (np.abs(rise) < NEAR) & has_ground, (rise < NEAR) & (rise > -SUNK))
     if steps:
         findings += yield from _skin_and_steps(motion, touching, steps)
-    return findings
+    named = yield from contact_check(character, skin, rise, has_ground)
+    known = {finding.code for finding in findings}
+    return findings + [finding for finding in named if finding.code not in known]
 
 
 def level_on_slope(
@@ -93,7 +97,8 @@ def level_on_slope(
             "level_on_slope",
             "error",
             f"The feet of '{motion.name}' stand level where '{ground}' slopes by {np.degrees(np.arccos(slope)):.0f}°",
-            "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+            "on stairs, take a mesh of them for the ground; on a hill, turn the feet to the slope.",
+            {"character": motion.name, "slope": round(float(np.arccos(slope)), 4)},
         )
     ]
 
@@ -178,7 +183,8 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(without_skin)} of {checked} steps of '{motion.name}' print where no skin rests, from frame "
                 f"{without_skin[0]:.0f} on",
-                "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
+                "check that its contacts are the parts that touch the ground.",
+                {"character": motion.name, "frames": without_skin, "steps": checked},
             )
         )
     rests = touching.rests
@@ -190,7 +196,8 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact in Advanced > Contacts.",
+                "add what rests there to its contacts.",
+                {"character": motion.name, "frames": len(missed), "frame": float(frames[missed[0]])},
             )
         )
     return findings

@@ -37,13 +37,13 @@ def check_volumes(footprints: Sequence[Footprint], ground: SoftGround, factors: 
         rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
         low, high = least * footprint.compressed_m3, most * footprint.compressed_m3
         if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
-            raise BakeError(
-                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
-                f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
-            )
+            fault = f"raised {raised:.6g} m³ where {high:.6g} m³ were displaced"
+            raise BakeError(_said(footprint, fault), "wrong_volume", sole=footprint.sole)
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
         if footprint.max_depth_m > (deepest * depth.max() + fallen) * (1 + DEPTH_TOLERANCE):
-            raise BakeError(
-                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
-                "was written. Please report this as a bug."
-            )
+            raise BakeError(_said(footprint, "is deeper than the layer"), "deeper_than_layer", sole=footprint.sole)
+
+
+def _said(footprint: Footprint, fault: str) -> str:
+    where = f"The print of {footprint.sole} at frame {footprint.start_frame:.0f}"
+    return f"{where} {fault}; nothing was written. Please report this as a bug."

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, damaged_record
 from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
@@ -152,9 +152,7 @@ class EditedSteps:
             try:
                 self._known[edits] = yield from without_warnings(self._pressed(edits))
             except _DAMAGE as error:
-                raise InputError(
-                    f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
-                ) from None
+                raise damaged_record(error, "motion") from None
         return self._known[edits]
 
     def _pressed(self, edits: frozenset[Change]) -> Slices[_Group]:
@@ -302,7 +300,8 @@ class EditedSteps:
         if baked is None:
             raise InputError(
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
-                "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again."
+                "pressed by a mesh of too many vertices, and can only be muted: give it fewer, and bake again.",
+                "too_many_vertices",
             )
         steps = grid_of(footprint).shifted(baked.steps(footprint.load_frames), edit.shift_frames)
         other = sole_of(edit, baked.pressing, self._feet)
@@ -320,7 +319,8 @@ class EditedSteps:
         if layout.window(self._cells).cells > most:
             raise InputError(
                 f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
-                f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
+                f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again.",
+                "damaged_record",
             )
         return layout
 

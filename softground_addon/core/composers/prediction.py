@@ -50,10 +50,6 @@ LEAST_POWER, MOST_POWER = 0.1, 3.0
 LEAST_LOAD = 1e-12
 """Of a depth, over the modulus; less is none."""
 SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
-TAKES_NO_PRINT = (
-    "No stiffness gives a print: the ground takes none under the feet. Check the masks, and the crust "
-    "in Advanced > Layers."
-)
 
 
 @dataclass(frozen=True)
@@ -245,7 +241,10 @@ def matching_modulus(
     if not 0 < depth <= material.deepest:
         raise InputError(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and that of the layer when "
-            f"packed, {material.deepest * 100:.3g} cm."
+            f"packed, {material.deepest * 100:.3g} cm.",
+            "depth_of_print",
+            depth=depth,
+            deepest=material.deepest,
         )
     middle = _middle(np.array(contacts.sample, int), 1).tolist()
     few, pressed = replace(contacts, sample=middle, beneath=[]), contacts.ground.material
@@ -263,11 +262,11 @@ def matching_modulus(
     if abs(reached - depth) <= CLOSE_ENOUGH * depth:
         return modulus
     if not any(reached for _, reached in tried):
-        raise InputError(TAKES_NO_PRINT)
-    raise InputError(
-        f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm: lower Settling Time in Advanced > "
-        "Realism, or choose a smaller depth."
-    )
+        message = "No stiffness gives a print: the ground takes none under the feet."
+        raise InputError(message, "no_print_at_all", remedy="Check its masks and its crust.")
+    message = f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm"
+    remedy = "choose a smaller depth, or ground that settles faster."
+    raise InputError(message, "settles_too_slowly", remedy=remedy, depth=depth)
 
 
 def _try(

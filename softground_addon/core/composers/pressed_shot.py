@@ -20,7 +20,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, without_sole, without_step
 from ..record.footprints import Footprint
 from ..record.record import BakeRecord
-from ..settings import TIME_LIMIT, BakeSettings
+from ..settings import BakeSettings
 from ..soles.deep_ground import wading
 from .edited_steps import with_edits
 from .prediction import pressed_contacts
@@ -119,11 +119,11 @@ def press_shot(
 def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
     """Raise InputError if legs would carve the ground for longer, or more of it, than the bake may take."""
     try:
-        check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s, set_by=TIME_LIMIT)
+        check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s)
     except InputError as error:  # if it is deep
         depths = (yield from pressed_contacts.slices(loads, ground, wanted.cell_size_m)).depths
         if wading(depths.max(initial=0.0), shortest_sole([character.motion for character in loads])) > 0:
-            raise InputError(f"Legs carve deep ground. {error} Or turn Carve off.") from None
+            raise InputError(f"Legs carve deep ground. {error}", "carving", remedy="Or do without carving.") from None
 
 
 def _edited(
@@ -138,7 +138,7 @@ def _simulate(
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s, set_by=TIME_LIMIT)
+    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     for result in simulate(loads, ground, wanted.cell_size_m):
@@ -187,7 +187,8 @@ def edit_findings(record: BakeRecord) -> list[Finding]:
             "edit_without_step",
             "warning",
             f"Step '{name}', which you edited, no longer exists: its foot does not touch the ground at that frame.",
-            "The edit is kept for when the step comes back; Reset All Steps drops it.",
+            "The edit is kept for when the step comes back.",
+            {"step": name},
         )
         for name in without_step(record.footprints, record.edits)
     ]
@@ -198,6 +199,7 @@ def edit_findings(record: BakeRecord) -> list[Finding]:
             f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the "
             f"sole '{record.edits[name].sole}' of its edit.",
             "The edit is kept for when that foot or mesh is there; choose another sole, or reset the step.",
+            {"step": name, "sole": record.edits[name].sole},
         )
         for name in without_sole(record.footprints, record.edits)
     ]

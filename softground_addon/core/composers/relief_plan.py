@@ -132,7 +132,7 @@ def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> Reli
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         known, numbers, treads = False, [], {}
     if not known or not all(math.isfinite(number) and number >= 0 for number in numbers):
-        raise InputError("The stored relief of the footprints is damaged: bake again.")
+        raise InputError("The stored relief of the footprints is damaged: bake again.", "damaged_record")
     strength, tread = numbers
     if not strength > 0:
         return None
@@ -186,9 +186,10 @@ def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -
     if soles and not treads:
         names = ", ".join(f"'{name}'" for name in dict.fromkeys(name for name, _ in soles))
         raise InputError(
-            f"Tread Pattern is 'From Shoes', and the soles of {names} show no grooves: model some into the undersides "
-            "of their meshes (half a millimetre deep or more, vertices 4 mm apart or less), have these rendered, or "
-            "choose another pattern."
+            f"The tread is to be that of the shoes, and the soles of {names} show no grooves",
+            "no_grooves",
+            remedy="model some into the undersides of their meshes (half a millimetre deep or more, vertices 4 mm "
+            "apart or less), have these rendered, or choose another pattern.",
         )
     return replace(wanted, shoe_treads=tuple(treads))
 

@@ -216,7 +216,8 @@ def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             "no_legs",
             "warning",
             f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
-            "Complete its joints in Advanced > Body Bones.",
+            "Complete its joints.",
+            {"character": character.motion.name},
         )
         for character in responses
         if not character.response.legs
@@ -228,6 +229,7 @@ def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             f"The leg of '{character.motion.name}' cannot follow step '{short.step}' to where it was moved: the foot "
             f"goes {short.part:.0%} of the way, so it does not stand in its print.",
             "Move the step less, or key the hips closer to it.",
+            {"character": character.motion.name, "step": short.step, "part": round(short.part, 3)},
         )
         for character in responses
         for short in character.out_of_reach
@@ -251,6 +253,7 @@ def _too_deep(character: CharacterResponse) -> Finding:
         f"'{name}' sinks {depth * 100:.0f} cm deep, {depth / leg:.0%} of its legs: a walk made for firm ground does "
         "not become wading by being lowered so far, and its knees stay bent.",
         "Choose a firmer or shallower ground, or an animation of somebody who wades.",
+        {"character": name, "depth": round(depth, 4), "leg": round(leg, 4)},
     )
 
 

@@ -62,20 +62,18 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: s
     name = f"'{ground}'" if ground else "the ground"
     if not any(character.contacts.standing.any() for character in loads):
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
-        raise InputError(
-            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
-            "feet in Advanced > Contacts."
-        )
+        message = f"No foot of {characters} touches {name} in these frames"
+        raise InputError(message, "no_contact", remedy="move the ground under the feet, or correct the feet.")
     if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
         raise InputError(
             f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own."
+            "separate the layer that is walked on into an object of its own.",
+            "layered_ground",
         )
     for character in loads:
         contacts, leg = character.contacts, character.motion.leg_length
         below = -(contacts.clearance + contacts.offset)[contacts.touching]
         if len(below) and (depth := float(np.median(below))) > leg:
-            raise InputError(
-                f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
-                "If it is a room, turn its faces inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
-            )
+            message = f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}"
+            remedy = "move the ground down to them. If it is a room, turn its faces inward."
+            raise InputError(message, "below_ground", remedy=remedy, character=character.motion.name, depth=depth)

@@ -241,7 +241,7 @@ class TimeGrid:
 
 def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
     if not loads:
-        raise InputError("There are no loads to press: give those of at least one body.")
+        raise InputError("There are no loads to press: give those of at least one body.", "no_loads")
     motions = [character.motion for character in loads]
     first = min(motion.frames[0] for motion in motions)
     spacing = max(motion.time_step * motion.frame_rate for motion in motions)
@@ -251,7 +251,8 @@ def time_grid(loads: Sequence[CharacterLoads]) -> TimeGrid:
         if abs(motion.time_step - motions[0].time_step) > 1e-9 or abs(offset - round(offset)) > 1e-3:
             raise InputError(
                 f"'{motion.name}' is sampled at other times than '{motions[0].name}': sample all characters at the "
-                "same frames of the same scene."
+                "same frames of the same scene.",
+                "other_times",
             )
         offsets.append(round(offset))
     count = max(offset + len(motion.frames) for offset, motion in zip(offsets, motions, strict=True))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import damaged_record
 from ..ground.soft_ground import SoftGround, Weathering
 from ..ground.sparse_grid import SparseGrid
 from ..loads.estimate import CharacterLoads
@@ -55,9 +55,7 @@ def thrown(
     try:
         return (yield from without_warnings(_thrown(record, ground, surface, cell_size, gravity)))
     except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
-        raise InputError(
-            f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
-        ) from None
+        raise damaged_record(error, "motion") from None
 
 
 def _thrown(

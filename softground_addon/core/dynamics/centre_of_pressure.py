@@ -19,7 +19,7 @@ def lowest_points(motion: CharacterMotion) -> Array:
     centres = []
     for sole in motion.soles:
         points = sole.landmark_positions()
-        centres.append((_nearness(points, motion)[..., None] * points).sum(axis=1))
+        centres.append(np.einsum("nl,nlc->nc", _nearness(points, motion), points))
     return np.stack(centres, axis=1)
 
 
@@ -31,8 +31,8 @@ def extents(motion: CharacterMotion, lowest: Array) -> Array:
     spread = []
     for index, sole in enumerate(motion.soles):
         points = sole.landmark_positions()
-        off = ((points[..., :2] - lowest[:, index, None, :2]) ** 2).sum(axis=-1)
-        spread.append((_nearness(points, motion) * off).sum(axis=1))
+        off = points[..., :2] - lowest[:, index, None, :2]
+        spread.append(np.einsum("nl,nlc,nlc->n", _nearness(points, motion), off, off))
     return np.sqrt(np.stack(spread, axis=1))
 
 
@@ -63,16 +63,16 @@ def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, ta
         How far `target` is followed, 0 to 1.
     """
     centres = lowest.copy()
-    missing = trust[:, None] * (target - (share[..., None] * centres[..., :2]).sum(axis=1))
-    emphasis = share / np.maximum((share**2).sum(axis=1, keepdims=True), 1e-9)
+    missing = trust[:, None] * (target - np.einsum("ns,nsc->nc", share, centres[..., :2]))
+    emphasis = share / np.maximum(np.einsum("ns,ns->n", share, share), 1e-9)[:, None]
     for index, sole in enumerate(motion.soles):
         points = sole.landmark_positions()
         along = points[:, -1, :2] - points[:, 0, :2]
         length = np.linalg.norm(along, axis=1, keepdims=True)
         along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
-        place = ((points[..., :2] - centres[:, index, None, :2]) * along[:, None]).sum(axis=-1)
+        place = np.einsum("nlc,nc->nl", points[..., :2] - centres[:, index, None, :2], along)
         height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
         place *= np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
-        wanted = (missing * along).sum(axis=1) * emphasis[:, index]
+        wanted = np.einsum("nc,nc->n", missing, along) * emphasis[:, index]
         centres[:, index, :2] += np.clip(wanted, place.min(axis=1), place.max(axis=1))[:, None] * along
     return centres

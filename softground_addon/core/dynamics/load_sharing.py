@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +55,7 @@ def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, bo
 def point_of_action(motion: CharacterMotion, lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
     """Point where the total force meets the level of the soles that touch, (N, 2) [m]."""
     count = touching.sum(axis=1)
-    ground = (lowest[..., 2] * touching).sum(axis=1) / np.maximum(count, 1)
+    ground = np.einsum("ns,ns->n", lowest[..., 2], touching) / np.maximum(count, 1)
     point = body.point_of_action(ground)
     standing = np.flatnonzero(_standing(motion, touching))
     if body.slow and len(standing):
@@ -181,6 +183,7 @@ def _within(step: NDArray[np.intp], start: Array, end: NDArray[np.intp]) -> Mask
     return (start < step[:, None]) & (step[:, None] < end)
 
 
+@cache
 def _cosine_ramp(length: int) -> Array:
     """A ramp from 0 to 1, at the middles of so many steps."""
     phase = (np.arange(length) + 0.5) / length

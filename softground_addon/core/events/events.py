@@ -38,6 +38,8 @@ COLUMNS = {
     "depth_m": "of the whole print",
     "area_m2": "largest of the step",
     "thrown_kg": "what the phase throws",
+    "carried": "on hard ground, what the sole brings there: mud, sand, snow, water or paint; else empty",
+    "film": "of that, over the thickest",
     "duration_s": "of the phase; of landings, until the sole leaves",
 }
 
@@ -190,6 +192,8 @@ def _row(
         "depth_m": _rounded(depth),
         "area_m2": _rounded(area),
         "thrown_kg": 0.0,
+        "carried": "",
+        "film": 0.0,
         "duration_s": _rounded(length * motion.time_step),
     }
 

@@ -2,7 +2,8 @@
 
 What a step compacts crackles: a Poisson process of micro-impacts, at the rate at which the record says that ground gave
 way. What slides hisses as the force changes. The heel thumps on what it has packed, and mud pops as the foot leaves.
-On a hard floor, heel and ball click as they come down.
+On a hard floor, heel and ball click as they come down; wet soles squeak as they leave, muddy ones squelch, and sand
+grinds.
 See `core.ground.surfaces` for the sources.
 """
 
@@ -51,6 +52,8 @@ CLICK = 0.006
 """Time within which a heel or a ball meets a hard floor [s]."""
 CLICKS = {"heel_strike": 3.0, "land": 3.0, "foot_flat": 1.0}
 """Phases that click on a hard floor, by their shares of its energy."""
+SQUEAK, SQUEAK_PITCH = 0.09, (1100.0, 2300.0)
+"""Time in which a wet sole sticks and slips before it leaves [s], and the range of its pitch [Hz]; by ear."""
 SPACING = 0.002
 """Between samples of a force that is known by its peaks [s]."""
 
@@ -77,6 +80,8 @@ class SoundStep:
         Scene frame and place [m] at which it begins.
     gains : tuple of float
         Of each channel.
+    carried, film : str, float
+        What the sole brings to a hard floor, and how much of it over the most.
     """
 
     name: str
@@ -90,6 +95,8 @@ class SoundStep:
     frame: float
     position: Array
     gains: tuple[float, ...] = (1.0,)
+    carried: str = ""
+    film: float = 0.0
 
 
 def steps_of(
@@ -156,7 +163,8 @@ def _on_hard(rows: Sequence[Event], frame_rate: float, first_frame: float) -> So
     clicks = np.stack([begins[:-1], begins[:-1] + CLICK, energy], axis=1)
     lifted = next((end for row in rows if row["phase"] == "toe_off"), None)
     name, place = f"{first['character']}/{first['contact']}@{first['frame']}", np.array(first["position"])
-    return SoundStep(name, surfaces.HARD, start, lifted, time, force, clicks, 0.0, first["frame"], place)
+    brings = {"carried": first.get("carried", ""), "film": first.get("film", 0.0)}
+    return SoundStep(name, surfaces.HARD, start, lifted, time, force, clicks, 0.0, first["frame"], place, **brings)
 
 
 def footsteps(steps: Sequence[SoundStep], seconds: float, recordings: Sequence[tuple[str, Array]] = ()) -> Array:
@@ -199,7 +207,9 @@ def step_sound(step: SoundStep) -> tuple[int, Array]:
     if step.struck is not None:
         heard += voice.thump * _thump(step, voice, random, clock - begin)
     if voice.pop and step.lifted is not None:
-        heard += voice.pop * _pop(step, random, clock - step.lifted)
+        heard += voice.pop * _pop(step, random, clock - step.lifted, step.depth)
+    if step.film:
+        heard += _brought(step, voice, random, clock)
     return round(begin * RATE), LOUDNESS * heard
 
 
@@ -302,14 +312,29 @@ def _thump(step: SoundStep, voice: Voice, random: np.random.Generator, since: Ar
     return np.asarray(force * np.exp(-since / THUMP_DECAY) * np.sin(2 * np.pi * fall))
 
 
-def _pop(step: SoundStep, random: np.random.Generator, since: Array) -> Array:
+def _brought(step: SoundStep, voice: Voice, random: np.random.Generator, clock: Array) -> Array:
+    """What a film on the sole adds on a hard floor."""
+    if step.carried == "sand":
+        return step.film * _hiss(step, voice, random, clock)
+    if step.lifted is None:
+        return np.zeros(len(clock))
+    if step.carried == "mud":
+        return _pop(step, random, clock - step.lifted + POP_LENGTH, FULL_POP * step.film)
+    low, high = SQUEAK_PITCH
+    part = np.clip((clock - step.lifted) / SQUEAK + 1.0, 0.0, 1.0)
+    pitch = low + (high - low) * random.random()
+    phase = 2 * np.pi * pitch * SQUEAK * (part + 0.1 * part**2)  # it rises as less of the sole is down
+    tone = sum(np.sin(number * phase) / number for number in (1, 2, 3))
+    return np.asarray(0.3 * np.sqrt(step.film) * loudness(step) * np.sin(np.pi * part) ** 2 * tone)
+
+
+def _pop(step: SoundStep, random: np.random.Generator, since: Array, depth: float) -> Array:
     """A tone whose pitch rises as the cavity closes, louder the deeper the foot was."""
     low, high = (pitch * (0.85 + 0.3 * random.random()) for pitch in POP_RISE)
     part = np.clip(since / POP_LENGTH, 0.0, 1.0)
     phase = POP_LENGTH * (low * part + (high - low) * part**3 / 3)
     shape = np.where((since >= 0) & (since < POP_LENGTH), np.sin(np.pi * part) ** 2, 0.0)
-    depth = min(step.depth / FULL_POP, 1.0)
-    return np.asarray(depth * loudness(step) * shape * np.sin(2 * np.pi * phase))
+    return np.asarray(min(depth / FULL_POP, 1.0) * loudness(step) * shape * np.sin(2 * np.pi * phase))
 
 
 def _recorded(step: SoundStep, recordings: Sequence[tuple[str, Array]], last: int) -> tuple[int, Array, int]:

@@ -53,7 +53,9 @@ def read(path: Path) -> Array:
                 raise wave.Error("it has no sampling rate")
             content = file.readframes(round(LONGEST_SAMPLE * rate))
     except (wave.Error, EOFError, OSError) as error:
-        raise InputError(f"'{path}' cannot be read ({error}): save it as an uncompressed WAV file.") from None
+        raise InputError(
+            f"'{path}' cannot be read ({error}): save it as an uncompressed WAV file.", "unreadable_file", path=path
+        ) from None
     bits = np.frombuffer(content[: len(content) // (width * channels) * width * channels], np.uint8).reshape(-1, width)
     whole = np.zeros((len(bits), 4), np.uint8)
     whole[:, 4 - width :] = bits if width > 1 else bits ^ 0x80  # of 8 bits, silence is 128

@@ -96,9 +96,9 @@ def check_place(path: Path) -> None:
     try:
         str(path).encode()
     except UnicodeEncodeError:
-        raise InputError(f"{str(path)!r} is not Unicode text: choose another name, or rename the folder.") from None
+        raise _refused(path, "is not Unicode text: choose another name, or rename the folder.") from None
     if not path.parent.is_dir():
-        raise InputError(f"The folder of '{path}' does not exist: create it first.")
+        raise _refused(path, "is in a folder that does not exist: create it first.")
     partial = _partial(path)
     try:
         partial.touch()
@@ -111,10 +111,8 @@ def check_room(path: Path, size: int) -> None:
     """Raise InputError unless a file of that size [bytes] has room on its disk: for writers that a full one ends."""
     free = shutil.disk_usage(path.parent).free
     if size > free:
-        raise InputError(
-            f"'{path}' may take up to {size / 1e6:,.0f} MB, and {free / 1e6:,.0f} MB are free: choose another folder, "
-            "or free disk space."
-        )
+        needed = f"may take up to {size / 1e6:,.0f} MB, and {free / 1e6:,.0f} MB are free"
+        raise _refused(path, f"{needed}: choose another folder, or free disk space.")
 
 
 def check_not_full(path: Path) -> None:
@@ -148,9 +146,9 @@ def write_text(path: Path, text: str) -> None:
 def _partial(path: Path) -> Path:
     """The name under which a file is written until it is whole."""
     if path.exists() and not path.is_file():
-        raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
+        raise _refused(path, "is a folder or a device, not a file: choose another name.")
     if path.exists() and not os.access(path, os.W_OK):
-        raise InputError(f"'{path}' is write-protected: choose another name, or make it writable.")
+        raise _refused(path, "is write-protected: choose another name, or make it writable.")
     # Containers share process ids, and some writers go by the suffix.
     return path.with_name(f".{path.stem}.{_MACHINE}-{secrets.token_hex(8)}.partial{path.suffix}")
 
@@ -190,4 +188,9 @@ def _sync_folder(folder: Path) -> None:
 
 def _not_written(path: Path, error: OSError) -> InputError:
     why = error.strerror or error
-    return InputError(f"'{path}' could not be written ({why}): choose another folder, or free disk space.")
+    return _refused(path, f"could not be written ({why}): choose another folder, or free disk space.")
+
+
+def _refused(path: Path, why: str) -> InputError:
+    name = str(path).encode(errors="backslashreplace").decode()
+    return InputError(f"'{name}' {why}", "not_writable", path=path)

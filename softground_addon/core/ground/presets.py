@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import cast, get_args
 
-from ..errors import InputError
+from ..errors import InputError, damaged
 from . import surfaces
 from .field_tests import boot_depth
 from .material import MATERIAL_RANGES, GroundMaterial, Pressure
@@ -84,19 +84,19 @@ def validate_material(values: Mapping[str, object], origin: str) -> GroundMateri
     known = {field.name for field in fields(GroundMaterial)}
     for name, value in values.items():
         if name not in known:
-            raise InputError(f"{origin}: unknown field '{name}'. Known are: {', '.join(sorted(known))}.")
+            raise damaged(origin, f"unknown field '{name}'. Known are: {', '.join(sorted(known))}.")
         _check(name, value, MATERIAL_RANGES.get(name, (-math.inf, math.inf)), origin)
     try:
         return GroundMaterial(**{name: float(value) for name, value in values.items()})  # type: ignore[arg-type]
     except TypeError:
         missing = sorted({"youngs_modulus", "poisson_ratio", "characteristic_time"} - set(values))
-        raise InputError(f"{origin}: the material lacks {', '.join(missing)}.") from None
+        raise damaged(origin, f"the material lacks {', '.join(missing)}.") from None
 
 
 def _check(name: str, value: object, limits: tuple[float, float], origin: str) -> None:
     low, high = limits
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number from {low:g} to {high:g}.")
+        raise damaged(origin, f"'{name}' is {value!r}; it must be a number from {low:g} to {high:g}.")
 
 
 def parse(text: str, origin: str) -> Preset:
@@ -110,33 +110,33 @@ def parse(text: str, origin: str) -> Preset:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin}: this is not JSON ({error}). Save the preset again, or delete the file.") from None
+        raise damaged(origin, f"this is not JSON ({error}). Save the preset again, or delete the file.") from None
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
-        raise InputError(f"{origin}: this is not a SoftGround preset of schema_version {SCHEMA_VERSION}.")
+        raise damaged(origin, f"this is not a SoftGround preset of schema_version {SCHEMA_VERSION}.")
     name, source, surface = (
         content.get(key, default) for key, default in (("name", ""), ("source", ""), ("surface", surfaces.DEFAULT))
     )
     material = content.get("material")
     if not isinstance(name, str) or not name.strip():
-        raise InputError(f"{origin}: the preset has no 'name'.")
+        raise damaged(origin, "the preset has no 'name'.")
     if not isinstance(source, str):
-        raise InputError(f"{origin}: 'source' must be text.")
+        raise damaged(origin, "'source' must be text.")
     surfaces.find(surface, origin)
     if not isinstance(material, dict):
-        raise InputError(f"{origin}: the preset has no 'material' table.")
+        raise damaged(origin, "the preset has no 'material' table.")
     pressure, numbers = content.get("pressure"), {}
     if pressure is not None and pressure not in get_args(Pressure):
-        raise InputError(f"{origin}: 'pressure' is {pressure!r}; it must be one of {', '.join(get_args(Pressure))}.")
+        raise damaged(origin, f"'pressure' is {pressure!r}; it must be one of {', '.join(get_args(Pressure))}.")
     for key, limits in RANGES.items():
         if (number := content.get(key)) is not None:
             _check(key, number, limits, origin)
             numbers[key] = float(number)
     debris = content.get("debris")
     if not isinstance(debris, bool | None):
-        raise InputError(f"{origin}: 'debris' is {debris!r}; it must be true or false.")
+        raise damaged(origin, f"'debris' is {debris!r}; it must be true or false.")
     section = content.get("section")
     if section is not None and section not in SECTIONS:
-        raise InputError(f"{origin}: 'section' is {section!r}; it must be one of {', '.join(SECTIONS)}.")
+        raise damaged(origin, f"'section' is {section!r}; it must be one of {', '.join(SECTIONS)}.")
     checked, spread = validate_material(material, origin), cast("Pressure | None", pressure)
     return Preset(name, source, surface, checked, spread, **numbers, debris=debris, section=section)
 
@@ -155,7 +155,7 @@ def load(path: Path) -> Preset:
             raise OSError(f"it is not a regular file of up to {LARGEST} bytes")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"Preset '{path}' cannot be read: {error}") from None
+        raise InputError(f"Preset '{path}' cannot be read: {error}", "unreadable_file", path=path) from None
     return parse(text, f"Preset '{path}'")
 
 
@@ -210,4 +210,4 @@ def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
             if bare((preset := load(path)).name) == wanted:
                 return preset
     known = ", ".join(path.stem for path in paths)
-    raise InputError(f"There is no preset '{name}'. There are: {known}; or give the path of a .json file.")
+    raise InputError(f"There is no preset '{name}'. Choose from {known}.", "unknown_preset", name=name)

@@ -115,7 +115,7 @@ class SparseGrid:
 
     def __init__(self, cell_size: float, *, channels: int, fill: float = 0.0) -> None:
         if not (np.isfinite(cell_size) and cell_size > 0):
-            raise InputError(f"The cell size is {cell_size!r} m: set it to a positive length, such as 0.01 m.")
+            raise InputError(f"The cell size is {cell_size!r} m: set it to a positive length.", "cell_size")
         self.cell_size = float(cell_size)
         self.channels = channels
         self.fill = fill

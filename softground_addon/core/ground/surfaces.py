@@ -20,9 +20,9 @@ Turchet, Serafin, Dimitrov and Nordahl 2010, "Physically based sound synthesis a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..errors import InputError
+from ..errors import damaged
 
 HOUR = 3600.0
 
@@ -153,6 +153,11 @@ class CarriedFilm:
     taken: float
     deposited: float
     water: float
+
+    def scaled(self, amount: float, reach: float) -> CarriedFilm:
+        """The film that is so many times as thick, and of which each step deposits 1/reach."""
+        deposited = min(self.deposited / reach, 1.0)
+        return replace(self, most=self.most * amount, taken=self.taken * amount, deposited=deposited)
 
 
 CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
@@ -347,4 +352,4 @@ def find(name: object, origin: str = "Ground") -> SurfaceRecord:
     """
     if isinstance(name, str) and name in SURFACES:
         return SURFACES[name]
-    raise InputError(f"{origin}: 'surface' is {name!r}; it must be one of {', '.join(SURFACES)}.")
+    raise damaged(origin, f"'surface' is {name!r}; it must be one of {', '.join(SURFACES)}.")

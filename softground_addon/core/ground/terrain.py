@@ -121,7 +121,7 @@ class MeshTerrain:
         if not upward.all():
             corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
-            raise InputError(f"{name} has no face under the character's path to stand on: move it under the feet.")
+            raise InputError(f"{name} has no face under the path to stand on: move it under the feet.", "no_ground")
         bins = yield from _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
         if of_faces is not None:

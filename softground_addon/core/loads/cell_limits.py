@@ -170,8 +170,6 @@ def check_cell_size(
     fine: Fineness,
     longest: float,
     available: float | None = None,
-    *,
-    set_by: str = "",
 ) -> None:
     """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
@@ -181,8 +179,6 @@ def check_cell_size(
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
-    set_by : str, optional
-        By what the user sets the longest time, for the message.
     """
     cell_size = fine.cell_size
     for character in loads:
@@ -191,7 +187,11 @@ def check_cell_size(
             raise InputError(
                 f"The soles of '{character.motion.name}' are {length * 100:.3g} cm long, smaller than a cell of "
                 f"{cell_size * 100:g} cm: set a cell size of at most {length / CELLS_ALONG_SOLE * 100:.2g} cm, or "
-                "correct the scale of the character or of the scene's units."
+                "correct the scale of the character or of the scene's units.",
+                "cell_larger_than_sole",
+                character=character.motion.name,
+                sole=length,
+                cell_size=cell_size,
             )
     available = machine_memory() if available is None else available
     coverage = coverage_of(loads)
@@ -199,19 +199,17 @@ def check_cell_size(
     def taken(size: float) -> tuple[float, float]:
         return coverage.bake_costs(replace(fine, cell_size=size))
 
-    too_much = _too_much(*taken(cell_size), longest, available, set_by)
+    too_much = _too_much(*taken(cell_size), longest, available)
     if not too_much:
         return
     sizes = cell_size * 1.05 ** np.arange(300)
     fits = [
         size for size in sizes[sizes < _shortest_of_largest(loads)] if not _too_much(*taken(size), longest, available)
     ]
-    remedy = f"set a cell size of at least {1.05 * fits[0] * 100:.2g} cm, or " if fits else ""  # it is rounded
+    larger = f"set a cell size of at least {1.05 * fits[0] * 100:.2g} cm, or " if fits else ""  # it is rounded
     names = ", ".join(f"'{character.motion.name}'" for character in loads)
-    raise InputError(
-        f"Cells of {cell_size * 100:g} cm would take about {_amount(*taken(cell_size))} for the steps of {names}, and "
-        f"{too_much}: {remedy}bake fewer frames."
-    )
+    message = f"Cells of {cell_size * 100:g} cm would take about {_amount(*taken(cell_size))} for the steps of {names}"
+    raise _refused(message, too_much, f"{larger}bake fewer frames.", *taken(cell_size))
 
 
 def _shortest_of_largest(loads: Sequence[CharacterLoads]) -> float:
@@ -219,9 +217,7 @@ def _shortest_of_largest(loads: Sequence[CharacterLoads]) -> float:
     return min(max(sole.sole.length for sole in character.motion.soles) for character in loads)
 
 
-def check_frames(
-    first: int, last: int, characters: int, longest: float, available: float | None = None, *, set_by: str = ""
-) -> None:
+def check_frames(first: int, last: int, characters: int, longest: float, available: float | None = None) -> None:
     """Raise InputError if so many frames of so many characters do not fit into memory or time; says what they take.
 
     Parameters
@@ -230,26 +226,29 @@ def check_frames(
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
-    set_by : str, optional
-        By what the user sets the longest time, for the message.
     """
     available = machine_memory() if available is None else available
     count = last - first + 1
     needed, time = count * characters * BYTES_PER_FRAME, count * characters / FRAMES_PER_SECOND
-    too_much = _too_much(needed, time, longest, available, set_by)
+    too_much = _too_much(needed, time, longest, available)
     if too_much:
-        raise InputError(
-            f"The {count:,} frames from {first} to {last} would take about {_amount(needed, time)}, and {too_much}: "
-            "set the first and the last frame of the bake, and look for a key that lies far away from the others."
-        )
+        message = f"The {count:,} frames from {first} to {last} would take about {_amount(needed, time)}"
+        remedy = "set the first and the last frame of the bake, and look for a key that lies far away from the others."
+        raise _refused(message, too_much, remedy, needed, time)
 
 
-def _too_much(needed: float, time: float, longest: float, available: float | None, set_by: str = "") -> str:
+def _refused(message: str, too_much: str, remedy: str, needed: float, time: float) -> InputError:
+    """Error about what takes too much memory [bytes] or time [s]."""
+    said, is_long = f"{message}, and {too_much}", too_much.endswith("allowed")
+    return InputError(said, "too_long" if is_long else "too_much_memory", remedy=remedy, memory=needed, time=time)
+
+
+def _too_much(needed: float, time: float, longest: float, available: float | None) -> str:
     """Limit that memory [bytes] or time [s] are beyond; empty where neither is."""
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:
-        return f"{duration(longest)} are allowed{set_by and f' ({set_by})'}"
+        return f"{duration(longest)} are allowed"
     return ""
 
 

@@ -225,10 +225,10 @@ def _onset(force: Array, first: int, search: int) -> float:
 
 def _last_below(rising: Array, level: float) -> float:
     """Last crossing of a level by a curve, in fractional samples; -1 if it is never below."""
-    below = np.flatnonzero(rising < level)
-    if not len(below) or below[-1] == len(rising) - 1:
+    since = int((rising[::-1] < level).argmax())
+    if not since:  # it is below to the end, or never
         return -1.0
-    i = below[-1]
+    i = len(rising) - 1 - since
     return float(i + (level - rising[i]) / (rising[i + 1] - rising[i]))
 
 
@@ -359,8 +359,11 @@ def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) ->
         strike, leave = pairs[..., 0], pairs[..., 1]
         possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > step[:, :1]) & (leave < end)
         overlap = np.where(possible, leave - strike, 1)[..., None]
-        phase = (step[:, None] - strike[..., None]) / overlap
-        ramp = np.cos(np.pi * np.clip(phase, 0.0, 1.0, out=phase), out=phase)
+        lengths = np.arange(1, overlap.max() + 1)[:, None]
+        cosines = np.cos(np.pi * np.minimum(np.arange(len(lengths) + 1) / lengths, 1.0))
+        into = np.clip(step[:, None] - strike[..., None], 0, overlap)
+        into += (overlap - 1) * cosines.shape[1]
+        ramp = cosines.ravel().take(into)
         ramp += 2 * share[:, None] - 1  # minus twice the misfit of a ramp (1 - cos)/2
         # A matrix product would wake the threads of the BLAS library, which cost more than they save here.
         misfit = np.einsum("gpw,gw->gp", np.square(ramp, out=ramp), telling / 4)

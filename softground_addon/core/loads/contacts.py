@@ -332,7 +332,9 @@ def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
     for first, last in zip(*runs(touching), strict=True):
         start, end = first, last
         if first > 0:
-            standing = np.percentile(rise[first:last], FLOAT_PERCENTILE, axis=0)
+            height, at = np.sort(rise[first:last], axis=0), FLOAT_PERCENTILE / 100 * (last - first - 1)
+            below, above = height[int(at)], height[min(int(at) + 1, last - first - 1)]
+            standing = below + at % 1 * (above - below)  # which np.percentile works out in ten times the time
             landed = (rise[first:last] < standing + LANDED_HEIGHT * motion.leg_length).any(axis=1)
             start += int(landed.argmax())
         if last < len(touching):

@@ -156,10 +156,9 @@ def _along_legs(motion: CharacterMotion, centre: Array, share: Array, pressure: 
         half = (hips[0] - hips[1])[:, :2] / 2
         for index, sole in enumerate(motion.soles):
             toward[:, index] += {"L": half, "R": -half}.get(sole.sole.side, 0.0)
-    height = centre[:, 2] - (share * pressure[..., 2]).sum(axis=1)
+    height = centre[:, 2] - np.einsum("ns,ns->n", share, pressure[..., 2])
     lean = toward / np.maximum(height, LOWEST_MEETING * motion.leg_length)[:, None, None]
-    leaning: Array = lean - (share[..., None] * lean).sum(axis=1, keepdims=True)
-    return leaning
+    return lean - np.einsum("ns,nsc->nc", share, lean)[:, None]
 
 
 def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> Array:

@@ -94,4 +94,5 @@ def advice(name: str, missed: Sequence[MissedStep], ground: str) -> Finding:
         f"{count} of '{name}' {meet} no ground on {ground} and {leave} no print, from frame {missed[0].frame:.0f} on "
         f"({', '.join(where)})",
         "extend or move the ground, or choose a mesh of the stairs or hill under the feet.",
+        {"character": name, "frames": [step.frame for step in missed], "beyond": int(beyond)},
     )

@@ -108,14 +108,17 @@ def without_missing(
 
 
 def _on_hard(motion: CharacterMotion, terrain: HardOnSoft, contacts: Contacts) -> Mask:
-    """The contacts (N, S) on hard objects: mostly over them, with nothing at the level of the soft ground beside."""
+    """The contacts (N, S) on hard objects: mostly over them, with nothing at the level of the soft ground beside.
+
+    What rolls or slides on is on them for as long as it is over them.
+    """
     on_hard, soft = np.zeros_like(contacts.touching), bare(terrain)
     for index, sole in enumerate(motion.soles):
         steps = np.flatnonzero(contacts.touching[:, index])
         level = float(contacts.offset[index]) + TOUCH_HEIGHT * motion.leg_length
         on_hard[steps, index] = _has_ground(sole, steps, terrain.hard_heights)
         on_hard[steps, index] &= ~_has_ground(sole, steps, soft.heights, level)
-        for first, last in zip(*runs(contacts.touching[:, index]), strict=True):
+        for first, last in zip(*runs(contacts.touching[:, index] & (sole.sole.prop is None)), strict=True):
             on_hard[first:last, index] = on_hard[first:last, index].mean() > 0.5
     return on_hard
 

@@ -68,7 +68,7 @@ def cover(vertices: Array, triangles: Indices, thickness: float, spacing: float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     upward = normal[:, 2] > np.cos(STEEPEST) * np.linalg.norm(normal, axis=1)
     if not upward.any():
-        raise InputError("It has no faces that look up: turn it, or flip its normals (Mesh > Normals > Flip).")
+        raise InputError("It has no faces that look up", "faces_down", remedy="turn it, or flip its normals.")
     terrain, flat = MeshTerrain.from_mesh(vertices, triangles[upward]), corners[upward][..., :2]
     low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
     fine = max(min(spacing, thickness / ACROSS_EDGE[0]), thickness / ACROSS_EDGE[1])
@@ -84,7 +84,7 @@ def cover(vertices: Array, triangles: Indices, thickness: float, spacing: float)
     number = np.arange(base.size).reshape(base.shape)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1)[lies]
     if not len(faces):
-        raise InputError("What of it looks up is too narrow, or in pieces that are: choose a larger mesh.")
+        raise InputError("What of it looks up is too narrow, or its pieces are: choose a larger mesh.", "too_narrow")
     used, faces = np.unique(faces, return_inverse=True)
     place = np.stack([*(each.ravel() for each in np.meshgrid(x, y)), (base + profile + LIFT).ravel()], axis=-1)
     return Cover(place[used], faces.reshape(-1, 4), profile.ravel()[used])

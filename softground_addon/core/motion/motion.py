@@ -71,6 +71,8 @@ class LowSkin:
         That its volume suggests [kg], 0 where it suggests none.
     on_the_spot : bool
         True if what rests slides back, as on a belt.
+    bones, soles : tuple of str
+        Bone and sole of each part, empty for none; without parts where they are not known.
     """
 
     frames: Array
@@ -80,6 +82,8 @@ class LowSkin:
     height: float
     mass: float = 0.0
     on_the_spot: bool = False
+    bones: tuple[str, ...] = ()
+    soles: tuple[str, ...] = ()
 
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -95,7 +95,7 @@ def mass_properties(vertices: Array, triangles: Indices) -> MassProperties:
     (0.166667, array([0.25, 0.25, 0.25]))
     """
     if not len(triangles):
-        raise InputError("A body without faces has no mass: give it faces, or choose another object.")
+        raise InputError("A body without faces has no mass: give it faces, or choose another object.", "no_faces")
     corners = np.asarray(vertices, dtype=float)[triangles]
     origin = corners.reshape(-1, 3).mean(axis=0)
     a, b, c = np.moveaxis(corners - origin, 1, 0)

@@ -2,7 +2,7 @@
 
 A band of half-width K is block tridiagonal in blocks of K rows. Cyclic reduction takes every other block out at once,
 which leaves a block tridiagonal system of half the size (Golub and Van Loan 2013, "Matrix Computations", 4th edition,
-section 4.5): a dozen rounds of array operations instead of one for each row. The blocks run along the last axis.
+section 4.5): a few rounds of array operations instead of one for each row. The blocks run along the last axis.
 """
 
 from __future__ import annotations
@@ -10,6 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+
+_DENSE = 24
+"""Blocks from which on down a dense solution is quicker than more rounds."""
 
 
 def solve_banded(band: Array, right: Array) -> Array:
@@ -56,8 +59,17 @@ def solve_banded(band: Array, right: Array) -> Array:
 def _reduce(diagonal: Array, coupling: Array, right: Array) -> Array:
     """Solve D[i]·x[i] + U[i]·x[i+1] + U[i-1]ᵀ·x[i-1] = r[i] for blocks i along the last axis."""
     size, columns, blocks = right.shape
-    if blocks == 1:
-        return _eliminate(diagonal, right)
+    if blocks <= _DENSE:
+        whole, row = np.zeros((blocks, size, blocks, size)), np.arange(blocks)
+        whole[row, :, row] = diagonal.transpose(2, 0, 1)
+        whole[row[:-1], :, row[1:]], whole[row[1:], :, row[:-1]] = (
+            coupling.transpose(2, 0, 1),
+            coupling.transpose(2, 1, 0),
+        )
+        flat = right.transpose(2, 0, 1).reshape(blocks * size, columns)
+        return (
+            np.linalg.solve(whole.reshape(2 * flat.shape[:1]), flat).reshape(blocks, size, columns).transpose(1, 2, 0)
+        )
     odd, last = blocks // 2, (blocks - 1) // 2  # odd blocks; those of them that have a block after them
     # Each odd block as a function of its even neighbours: x = constant - from_before·x[i-1] - from_after·x[i+1].
     sides = np.zeros((size, 2 * size + columns, odd))

@@ -6,6 +6,8 @@ ends of the path, takes samples at any subset of the steps, and known accelerati
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 
 from .arrays import Array, Mask
@@ -59,9 +61,10 @@ def smooth_path(
     band = np.zeros((_ORDER + 1, count))
     band[0] = weight
     _add_difference(band, np.full(count - _ORDER, density / scale ** (2 * _ORDER)), _ORDER)
-    ends = np.zeros(count - 2)
-    ends[[0, -1]] = steady_ends * density / (scale**4 * cutoff * step)
-    _add_difference(band, ends, 2)
+    if steady_ends:
+        ends = np.zeros(count - 2)
+        ends[[0, -1]] = steady_ends * density / (scale**4 * cutoff * step)
+        _add_difference(band, ends, 2)
     right = weight[:, None] * path
     if falling is not None:
         rows = np.where(falling[1:-1], _FALL_WEIGHT * density / scale**4, 0.0)
@@ -85,9 +88,7 @@ def _add_difference(band: Array, weight: Array, order: int) -> None:
 
     band[k, i] is the matrix element (i, i + k).
     """
-    stencil = np.array([1.0])
-    for _ in range(order):
-        stencil = np.convolve(stencil, (1.0, -1.0))
+    stencil = [(-1.0) ** place * comb(order, place) for place in range(order + 1)]
     for i, a in enumerate(stencil):
         for j in range(i, order + 1):
             band[j - i, i : i + len(weight)] += a * stencil[j] * weight

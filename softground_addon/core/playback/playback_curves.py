@@ -24,7 +24,7 @@ from ..relief.steps import NOTHING, StepRelief
 from .blocks import ChangesInBlocks
 from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
-from .vertex_histories import VertexHistories, vertex_histories
+from .vertex_histories import Movements, VertexHistories, movements_at
 
 Integers = NDArray[np.int32]
 Floats = NDArray[np.float32]
@@ -41,8 +41,11 @@ LENGTH = 512.0
 TICK = 2.0**-14
 """Resolution of the time along a curve [frames]."""
 
-CONTACTS_AT_ONCE = 5_000
-"""Footprints' cells over places whose histories are computed together: some ten megabytes."""
+CONTACTS_AT_ONCE = 20_000
+"""Footprints' cells over places whose histories are computed together: some forty megabytes."""
+
+CONTACTS_HELD = 400_000
+"""Those up to which movements are held for the next curves: some sixty megabytes."""
 
 SMALL = 1 << 19
 """Points of curves up to which they are not packed: eight megabytes."""
@@ -118,17 +121,22 @@ def playback_curves_at(
     time_stretch: float = 1.0,
     tolerance: float = TOLERANCE,
     relief: Sequence[StepRelief] = (),
+    known: list[Movements] | None = None,
 ) -> Slices[tuple[Spans, PlaybackCurves]]:
     """The record as curves at given places.
 
     Parameters
     ----------
-    footprints, x, y, blur_sigma, tolerance, relief
-        See `vertex_histories.vertex_histories`.
+    footprints, x, y, blur_sigma, tolerance
+        See `vertex_histories.movements_at`.
     frame_rate : float
         Frames of the footprints per second [Hz].
     time_stretch : float
         Frames of the curves for each frame of the footprints.
+    relief : sequence of StepRelief
+        Of each footprint at the places, if there is any.
+    known : list of Movements, optional
+        Those of an earlier call of the same footprints and places, or an empty list that is filled.
     """
     nowhere = np.zeros(0, dtype=np.intp)
     nothing = np.zeros(0, dtype=np.float32)
@@ -141,17 +149,19 @@ def playback_curves_at(
     position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
     parts = _parts(footprints, x, y)
     in_blocks: dict[int, ChangesInBlocks] = {}
-    for places, reliefs in zip(parts, _relief_of_parts(relief, parts, len(x)), strict=True):
-        over_time = yield from vertex_histories.slices(
-            footprints,
-            x[places],
-            y[places],
-            blur_sigma=blur_sigma,
-            tolerance=tolerance,
-            relief=reliefs,
-            in_blocks=in_blocks,
-        )
+    holds = known is not None and len(parts) * CONTACTS_AT_ONCE <= CONTACTS_HELD
+    held = known if known is not None and holds else []
+    for number, (places, reliefs) in enumerate(zip(parts, _relief_of_parts(relief, parts, len(x)), strict=True)):
+        if number < len(held):
+            movements = held[number]
+        else:
+            movements = yield from movements_at.slices(
+                footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance, in_blocks=in_blocks
+            )
+            if holds:
+                held.append(movements)
         yield
+        over_time = movements.with_relief(reliefs)
         is_small = len(position) < SMALL
         spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch, is_small=is_small)
         part = replace(spans, point=places[spans.point], curve=spans.curve + np.int32(count))

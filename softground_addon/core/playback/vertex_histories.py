@@ -81,18 +81,48 @@ class VertexHistories:
         )
 
 
+@dataclass(frozen=True)
+class Movements:
+    """Vertex histories without relief, footprint by footprint.
+
+    Attributes
+    ----------
+    of_footprints : list of (int, (float, float), Ramps)
+        Number of each footprint near the places, the frames between which it moves the ground, and its ramps.
+    """
+
+    of_footprints: list[tuple[int, tuple[float, float], Ramps]]
+    contacts: PointContacts
+    error: float
+
+    def with_relief(self, relief: Sequence[StepRelief]) -> VertexHistories:
+        """The vertex histories; relief of each footprint, if there is any, grows with the movement of its step."""
+        movements = []
+        for number, span, ramps in self.of_footprints:
+            its = relief[number] if relief else NOTHING
+            movements.append(grown(ramps, its.point, its.change, span) if len(its.point) else ramps)
+        return VertexHistories(Ramps.joined(movements, 2), self.contacts, self.error)
+
+
 @sliced
 def vertex_histories(
+    footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, relief: Sequence[StepRelief] = ()
+) -> Slices[VertexHistories]:
+    """The record as it is seen from given places: `movements_at` these, with the relief of each footprint there."""
+    return (yield from movements_at.slices(footprints, x, y, blur_sigma=blur_sigma)).with_relief(relief)
+
+
+@sliced
+def movements_at(
     footprints: Sequence[Footprint],
     x: Array,
     y: Array,
     *,
     blur_sigma: float,
     tolerance: float = TOLERANCE,
-    relief: Sequence[StepRelief] = (),
     in_blocks: dict[int, ChangesInBlocks] | None = None,
-) -> Slices[VertexHistories]:
-    """The record as it is seen from given places.
+) -> Slices[Movements]:
+    """The record as it is seen from given places, without relief.
 
     Parameters
     ----------
@@ -103,8 +133,6 @@ def vertex_histories(
     tolerance : float
         Largest error of a displayed height while it moves [m]; where footprints move the same ground at the same
         time, they share it.
-    relief : sequence of StepRelief
-        Of each footprint at these places, if there is relief: it grows with the movement that its step makes.
     in_blocks : dict, optional
         Cache of the footprints near the places, by their numbers, for the next call at places beside them.
     """
@@ -119,15 +147,14 @@ def vertex_histories(
     for number in near:
         in_blocks.setdefault(number, ChangesInBlocks(footprints[number], is_small=is_small))
     footprints = [footprints[number] for number in near]
-    reliefs = [relief[number] if relief else NOTHING for number in near]
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
-    movements: list[Ramps] = []
+    movements: list[tuple[int, tuple[float, float], Ramps]] = []
     contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
     is_carved = np.array([not len(footprint.contact_cells) for footprint in footprints], dtype=bool)
-    for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
-        of_step: list[Ramps] = []
+    for number, footprint in enumerate(footprints):
+        of_step = [_NO_RAMPS]
         alike = is_carved == is_carved[number]
         together = np.flatnonzero(alike & (spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
         allowed = np.array([tolerance, SHADING_TOLERANCE])
@@ -148,17 +175,10 @@ def vertex_histories(
             of_step.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float(((fitted.error[:, 0] + off) * shared).max(initial=0.0)))
             yield
-        if len(its_relief.point):
-            span = spans[number, 0], spans[number, 1]
-            of_step = [grown(side_by_side([_NO_RAMPS, *of_step]), its_relief.point, its_relief.change, span)]
-        movements += of_step
+        movements.append((near[number], (spans[number, 0], spans[number, 1]), side_by_side(of_step)))
         contacts.append(_point_contacts(footprint, places))
         yield
-    return VertexHistories(
-        Ramps.joined(movements, 2),
-        joined(contacts),
-        error,
-    )
+    return Movements(movements, joined(contacts), error)
 
 
 def _without_small_ends(moved: Array, margin: Array) -> Array:

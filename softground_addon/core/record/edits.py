@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, damaged
 from . import mesh_sole
 from .contact_steps import PressingSole
 from .footprints import Footprint
@@ -109,9 +109,8 @@ def new_copy(edits: Mapping[str, StepEdit], footprint: Footprint) -> str:
     taken = {_parts(name)[2] for name in edits if _is_of(name, footprint, _parts(name)[2])}
     free = next((copy for copy in range(1, MOST_COPIES + 1) if copy not in taken), None)
     if free is None:
-        raise InputError(
-            f"Step '{step_id(footprint)}' already has {MOST_COPIES} copies, the most there can be: copy another step."
-        )
+        message = f"Step '{step_id(footprint)}' already has {MOST_COPIES} copies, the most: copy another step."
+        raise InputError(message, "too_many_copies")
     return step_id(footprint, free)
 
 
@@ -270,14 +269,15 @@ def from_json(content: object, origin: str) -> dict[str, StepEdit]:
         Naming the step and the field that is unknown or out of range.
     """
     if not isinstance(content, dict) or not isinstance(steps := content.get("steps"), dict):
-        raise InputError(f"{origin} must be a table with 'schema_version' and 'steps'.")
+        raise damaged(origin, "it must be a table with 'schema_version' and 'steps'.")
     if content.get("schema_version") != SCHEMA_VERSION:
-        raise InputError(
-            f"{origin} is of version {content.get('schema_version')!r}; this SoftGround reads version {SCHEMA_VERSION}."
+        raise damaged(
+            origin,
+            f"it is of version {content.get('schema_version')!r}; {SCHEMA_VERSION} is read.",
         )
     _check_fields(content, ("schema_version", "steps", "soles"), origin)
     if not isinstance(soles := content.get("soles", {}), dict):
-        raise InputError(f"{origin}: 'soles' must be a table by the names of objects.")
+        raise damaged(origin, "'soles' must be a table by the names of objects.")
     edits = {name: _edit(name, change, origin) for name, change in steps.items()}
     named = {edit.sole for edit in edits.values()} & soles.keys()
     read = {name: mesh_sole.from_json(name, soles[name], f"{origin}, sole {name!r}") for name in sorted(named)}
@@ -290,13 +290,13 @@ def _edit(name: str, change: object, origin: str) -> StepEdit:
         _parts(name)
         name.encode()
     except ValueError:  # also for half a character
-        raise InputError(f"{where}: this is not the id of a step. The bake's report names them: steps, id.") from None
+        raise damaged(where, "this is not the id of a step. The bake's report names them: steps, id.") from None
     if not isinstance(change, dict):
-        raise InputError(f'{where} must be a table such as {{"mute": true}}.')
+        raise damaged(where, 'it must be a table such as {"mute": true}.')
     _check_fields(change, tuple(_CHECKS), where)
     for field, (is_valid, needed, _) in _CHECKS.items():
         if field in change and not is_valid(change[field]):
-            raise InputError(f"{where}: '{field}' is {change[field]!r}; it must be {needed}.")
+            raise damaged(where, f"'{field}' is {change[field]!r}; it must be {needed}.")
     return StepEdit(**{field: _CHECKS[field][2](value) for field, value in change.items()})
 
 
@@ -353,4 +353,4 @@ def _middle(footprint: Footprint) -> float:
 def _check_fields(table: Mapping[str, object], known: tuple[str, ...], where: str) -> None:
     unknown = [key for key in table if key not in known]
     if unknown:
-        raise InputError(f"{where}: unknown field {unknown[0]!r}. Known are: {', '.join(known)}.")
+        raise damaged(where, f"unknown field {unknown[0]!r}. Known are: {', '.join(known)}.")

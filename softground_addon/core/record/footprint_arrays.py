@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import damaged_record
 from ..ground.sparse_grid import Window
 from ..ground.surfaces import SURFACES
 from . import contact_arrays
@@ -134,9 +134,7 @@ def from_arrays(
         for footprint in footprints:
             _check(footprint)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(
-            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
-        ) from None
+        raise damaged_record(error) from None
     return footprints
 
 

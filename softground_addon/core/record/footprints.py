@@ -301,7 +301,9 @@ def recompose(footprints: Iterable[Footprint], frame: float = np.inf, *, cell_si
     if len(sizes) != 1:
         raise InputError(
             f"The footprints are recorded at cell sizes of {sorted(sizes) or 'no'} m and cannot share one ground: "
-            "bake them again at one cell size."
+            "bake them again at one cell size.",
+            "cell_sizes_differ",
+            cell_sizes=sorted(sizes),
         )
     ground = HeightField(sizes.pop())
     for footprint in footprints:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import damaged
 from ..motion.sole_motion import Sole
 from ..numerics.arrays import Array
 from .contact_arrays import sole_from_arrays, sole_to_arrays
@@ -73,8 +73,8 @@ def from_json(name: str, content: object, where: str) -> MeshSole:
         sole = MeshSole(name, numbers.tobytes(), coded.tobytes())
         _check(sole.pressing)
     except (ValueError, TypeError, OverflowError, np.linalg.LinAlgError) as error:
-        raise InputError(
-            f"{where}: this is no sole of a mesh ({error}). Leave it out: a bake cuts it from the object."
+        raise damaged(
+            where, f"this is no sole of a mesh ({error}). Leave it out: a bake cuts it from the object."
         ) from None
     return sole
 

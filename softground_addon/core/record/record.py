@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, damaged_record
 from ..numerics.slices import Slices, sliced
 from . import archive as members
 from . import edits as step_edits
@@ -237,7 +237,7 @@ def load(content: bytes) -> BakeRecord:
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
-        raise _damaged(error) from None
+        raise damaged_record(error) from None
     changes = step_edits.from_json(edits, _EDITS)
     carved_with = step_edits.from_json(text["carved_with"], _EDITS) if "carved_with" in text else {}
     footprints = from_arrays(names, soles, arrays)
@@ -260,15 +260,11 @@ def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.Ste
             record = load(content)
             return dict(record.about), dict(record.edits)
     except _DAMAGE as error:
-        raise _damaged(error) from None
+        raise damaged_record(error) from None
     return about, step_edits.from_json(edits, _EDITS)
 
 
 _EDITS = "The stored record's edits of steps"
-
-
-def _damaged(error: BaseException) -> InputError:
-    return InputError(f"The stored record of the footprints is damaged ({error}): clear the bake and bake again.")
 
 
 def _text(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
@@ -282,7 +278,8 @@ def _text(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
     if version != FORMAT and version not in MIGRATIONS:
         raise InputError(
             f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
-            f"to {FORMAT}: bake again, or update SoftGround."
+            f"to {FORMAT}: bake again, or update SoftGround.",
+            "newer_record",
         )
     if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
         raise ValueError("it has parts that no record has")

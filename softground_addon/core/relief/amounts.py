@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, damaged
 from ..ground import surfaces
 from .layers import Apron, Cracks, Crumbs, Edge, Fans, Fissures, Floor, Layer, Lip, Lumps, Streaks
 
@@ -114,7 +114,7 @@ def of_look(look: str) -> Amounts:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"Relief '{path}' cannot be read: {error}") from None
+        raise InputError(f"Relief '{path}' cannot be read: {error}", "unreadable_file", path=path) from None
     return parse(text, f"Relief '{path}'", look)
 
 
@@ -129,9 +129,9 @@ def parse(text: str, origin: str, surface: str) -> Amounts:
     try:
         table = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin}: this is not JSON ({error}).") from None
+        raise damaged(origin, f"this is not JSON ({error}).") from None
     if not isinstance(table, dict):
-        raise InputError(f"{origin}: this is not a table of amounts.")
+        raise damaged(origin, "this is not a table of amounts.")
     layers = [
         _made(kind, values, f"{origin}, {name}")
         for name, kind in LAYERS.items()
@@ -157,13 +157,13 @@ def _made(kind: type[Any], values: Any, origin: str) -> Any:
     """An instance of a dataclass of numbers from a table."""
     known = {field.name: field for field in fields(kind)}
     if not isinstance(values, dict) or not values.keys() <= known.keys():
-        raise InputError(f"{origin}: it must be a table of {', '.join(known)}.")
+        raise damaged(origin, f"it must be a table of {', '.join(known)}.")
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number.")
+            raise damaged(origin, f"'{name}' is {value!r}; it must be a number.")
         if abs(value) > LARGEST:
-            raise InputError(f"{origin}: '{name}' is {value!r}; it must be at most {LARGEST:g}.")
+            raise damaged(origin, f"'{name}' is {value!r}; it must be at most {LARGEST:g}.")
     missing = [name for name, field in known.items() if field.default is MISSING and name not in values]
     if missing:
-        raise InputError(f"{origin}: it lacks {', '.join(missing)}.")
+        raise damaged(origin, f"it lacks {', '.join(missing)}.")
     return kind(**values)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,10 @@ class StepRelief:
     change: Array
     water: Array
     tread: bool = False
+
+    def scaled(self, strength: float) -> StepRelief:
+        """The same with so many times the change, in whole quanta."""
+        return replace(self, change=np.round(strength * self.change / QUANTUM) * QUANTUM)
 
 
 NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
@@ -99,9 +103,10 @@ def relief_of_steps(
     for footprint in footprints:
         yield
         if loose and not len(footprint.contact_cells):
-            steps.append(_carve(footprint, loose, places, lumped, water, wanted))
+            step = _carve(footprint, loose, places, lumped, water, wanted)
         else:
-            steps.append(_step(footprint, places, standing, water, wanted, blur_sigma))
+            step = _step(footprint, places, standing, water, wanted, blur_sigma)
+        steps.append(step.scaled(wanted.strength))
     return steps
 
 
@@ -113,7 +118,7 @@ def _step(
     wanted: ReliefSettings,
     blur_sigma: float,
 ) -> StepRelief:
-    """Relief that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
+    """Relief of full strength that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
     if not len(footprint.contact_cells):
         return NOTHING
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
@@ -133,7 +138,7 @@ def _step(
     if of_print is None:
         return NOTHING
     relief = of_print.at(places.x[point], places.y[point])
-    change = wanted.strength * np.stack([relief.height, relief.compression], axis=-1)
+    change = np.stack([relief.height, relief.compression], axis=-1)
     change -= relief.pressed[:, None] * standing[point]
     change = np.round(change / QUANTUM) * QUANTUM
     standing[point] += change
@@ -145,13 +150,13 @@ def _step(
 def _carve(
     carve: Footprint, loose: HeightField, places: Places, lumped: Array, water: Array, wanted: ReliefSettings
 ) -> StepRelief:
-    """Lumps in what a body carved; updates those (K,) at all places."""
+    """Lumps of full strength in what a body carved; updates those (K,) at all places."""
     point = places.within(carve.window, carve.cell_size)
     if not len(point):
         return NOTHING
     amounts = wanted.of_surfaces.get(carve.surface, wanted.amounts)
     smallest = FINEST_CRUMB * _finest(places, point, carve.cell_size)
-    height = wanted.strength * lumps(carve, loose, places.x[point], places.y[point], amounts, smallest)
+    height = lumps(carve, loose, places.x[point], places.y[point], amounts, smallest)
     height = np.round(height / QUANTUM) * QUANTUM
     change = np.where(height, height - lumped[point], 0.0)
     lumped[point] += change

@@ -74,7 +74,7 @@ def trainer(under: Under) -> Array:
     return np.asarray(np.maximum(bars * (under.inward > 0.006), _band(under.across, 0.0022) * (under.inward > 0.012)))
 
 
-_PADS = np.array(
+PADS = np.array(
     [
         (-0.365, 0.005, 0.125, 0.37), (-0.13, -0.24, 0.25, 0.20), (0.13, -0.17, 0.14, 0.30), (0.165, 0.22, 0.125, 0.28),
         (0.405, 0.27, 0.080, 0.150), (0.425, 0.04, 0.044, 0.068), (0.395, -0.115, 0.038, 0.062),
@@ -91,7 +91,7 @@ def bare(under: Under) -> Array:
     """Pads of heel, ball and toes; the arch, and the gaps before and between the toes, stand."""
     along, across = under.along / LENGTH, under.across / under.breadth
     far = np.full(len(along), -1.0)
-    for ahead, left, half_length, half_breadth in _PADS:
+    for ahead, left, half_length, half_breadth in PADS:
         share = np.hypot((along - ahead) / half_length, (across - left) / half_breadth)
         pad = (1.0 - share) * min(half_length * LENGTH, half_breadth * under.breadth)
         width = min(_FLESH, 0.4 * half_length * LENGTH)  # toes stay apart

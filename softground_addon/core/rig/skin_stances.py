@@ -118,7 +118,8 @@ def skin_stances(
     }
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
     rise, calm, on_the_spot = tracks.rise * height, tracks.calm * height, bool(contacts.drift.any())
-    lowest_skin = LowSkin(recording.frames, lowest, rise, calm, height, mass, on_the_spot)
+    of_part = tuple(sources[number].name if number >= 0 else "" for number in group)
+    lowest_skin = LowSkin(recording.frames, lowest, rise, calm, height, mass, on_the_spot, followed.bones, of_part)
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, lowest_skin)
 
 

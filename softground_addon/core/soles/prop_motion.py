@@ -47,13 +47,14 @@ def prop_motion(
     stretch = turn.T @ matrices[0, :3, :3]
     sizes = np.linalg.svd(stretch, compute_uv=False)
     if not sizes.min() > _FLAT * max(sizes.max(), 1e-300):
-        raise InputError(f"'{owner}' has a scale of zero: set its scale, or that of its parents.")
+        raise InputError(f"'{owner}' has a scale of zero: set its scale, or that of its parents.", "scale_of_zero")
     rotation = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(stretch))
     change = np.abs(matrices[:, :3, :3] - rotation @ stretch).max(axis=(1, 2)) / sizes.max()
     if change.max() > _SAME_SIZE:
         raise InputError(
             f"'{owner}' changes its size or shape, but prints as a rigid body: take the keys off its scale, or let a "
-            "child that keeps its size print."
+            "child that keeps its size print.",
+            "changing_shape",
         )
     vertices = vertices @ stretch.T
     mass = mass_properties(vertices, triangles)

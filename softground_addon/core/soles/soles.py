@@ -126,7 +126,7 @@ def anatomical_sole(
         If the length is not a positive number.
     """
     if not (np.isfinite(length) and length > 0):
-        raise InputError(f"The sole '{name}' would be {length} m long: give it a positive size.")
+        raise InputError(f"The sole '{name}' would be {length} m long: give it a positive size.", "sole_length")
     breadth = FOOT_BREADTH * length
     medial = {"L": -1.0, "R": 1.0}.get(side, 0.0) if medial is None else medial
     outline = _smooth_loop(_outline_for(medial)) * (length, breadth)
@@ -191,10 +191,7 @@ def _from_underside(
     used = vertices[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
     extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside: it needs faces that look down when it stands. "
-            "Give the sole another object, or let it use the foot bones."
-        )
+        raise _no_underside(name, ": it needs faces that look down when it stands")
     length = float(max(extent))
     grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
     heights, coverage, samples = underside_map(
@@ -203,10 +200,7 @@ def _from_underside(
     loops = trace_loops(coverage, grid.origin, grid.spacing)
     loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
     if not loops:
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside larger than a point. "
-            "Give the sole another object, or let it use the foot bones."
-        )
+        raise _no_underside(name, " larger than a point")
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
     placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
     first = _MARGIN * SUPERSAMPLING + SUPERSAMPLING // 2
@@ -214,6 +208,11 @@ def _from_underside(
     drawn = samples[first:rows, first:columns]
     bend = 0.0 if ball is None or toe_weight is None else _bend(used, toe_weight[np.unique(triangles)], ball_x)
     return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T, bend=bend))
+
+
+def _no_underside(name: str, why: str) -> InputError:
+    remedy = "Give the sole another object, or let it use the foot bones."
+    return InputError(f"The mesh of the sole '{name}' has no underside{why}. {remedy}", "no_underside", sole=name)
 
 
 def _bend(vertices: Array, toe_weight: Array, ball: float) -> float:
@@ -248,7 +247,7 @@ def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: 
         If it has no faces.
     """
     if not len(triangles):
-        raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.")
+        raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.", "no_faces")
     hard = Prop(np.asarray(vertices, dtype=float), triangles)
     prop = dataclasses.replace(hard, give=give * hard.size)
     landmarks = supports(prop.probes)

@@ -138,23 +138,30 @@ def test_edits_of_steps_have_them_pressed_anew_and_come_with_the_bake(again):
     assert baked_ground.record_of(ground).edited[0].compressed_m3 == half.compressed_m3
 
 
+PRINTED = {"prints", "movements", "relief"}
+"""What follows from other prints."""
+
+
 @pytest.mark.parametrize(
     ("name", "follows"),
     [
         ("nothing", set()),
-        ("relief", set()),
-        ("pressure", {"prints"}),
-        ("preset", {"prints"}),
-        ("cell_size", {"prints"}),
-        ("mass", {"prints", "loads", "motion"}),
-        ("keys", {"prints", "loads", "motion"}),
-        ("shoes", {"prints", "loads", "terrain", "motion"}),
-        ("ground", {"prints", "loads", "terrain", "motion"}),  # the bake is cleared before
+        ("relief_strength", set()),
+        ("tread", {"relief"}),
+        ("pressure", PRINTED),
+        ("preset", PRINTED),
+        ("cell_size", PRINTED),
+        ("mass", PRINTED | {"loads", "motion"}),
+        ("keys", PRINTED | {"loads", "motion"}),
+        ("shoes", PRINTED | {"loads", "terrain", "motion"}),
+        ("ground", PRINTED | {"loads", "terrain", "motion"}),  # the bake is cleared before
     ],
 )
 def test_a_bake_works_out_only_what_follows_from_what_has_changed(again, name, follows):
     bake(again)
     assert anew(again, lambda: CHANGES[name](again, 1)) == follows
+    if not follows:
+        assert record_in(again) == (reuse.forget(), record_in(again))[1]
 
 
 @pytest.mark.parametrize("value", [0.05, 0.3])

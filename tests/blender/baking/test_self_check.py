@@ -33,7 +33,8 @@ def test_each_finding_is_in_the_report_once_worst_first_and_what_the_panel_shows
     bpy.context.view_layer.update()
     report = bake(short_walk, ground=ground).report
     assert [finding["code"] for finding in report["self_check"]] == ["ground_off_skin", "mass_of_size"]
-    assert all(set(finding) == {"code", "severity", "message", "remedy"} for finding in report["self_check"])
+    assert all(set(finding) == {"code", "severity", "message", "remedy", "facts"} for finding in report["self_check"])
+    assert report["self_check"][1]["facts"]["mass"] == 3.0
     assert "6." in report["self_check"][0]["message"].split("rests ")[1][:2]
     assert report["warnings"] == ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
     for finding, warning in zip(report["self_check"], report["warnings"], strict=True):

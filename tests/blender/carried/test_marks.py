@@ -8,16 +8,17 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, jobs, mesh_arrays
+from softground_addon.blender import compat, jobs, mesh_arrays, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes import node_modifiers
-from softground_addon.blender.output import exports
+from softground_addon.blender.output import export_formats, exports, mark_images
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
+from softground_addon.core.record.footprints import NEVER
 from softground_addon.core.weather import weather
 from tests.blender.ground.test_hard_ground import LOW, box, listed, over_a_crate
 from tests.blender.grounds import bake, heights
@@ -108,6 +109,35 @@ def test_marks_dry_as_weather_dries_them(scene):
     wet = weather.wetness(age * 0.5e-3 / 3600 / np.maximum(water, 1e-12) * weather.SURFACE_FILM)
     assert values(mesh, "wetness")[mass > 0] == pytest.approx(wet[mass > 0], abs=1e-3)
     assert 0 < np.mean(wet[mass > 0]) < 1
+
+
+def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene, tmp_path):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    low, size = np.array(crate.bound_box).min(axis=0), np.array(crate.dimensions)
+    layer = crate.data.uv_layers.new()
+    for loop in crate.data.loops:
+        x, y, z = np.array(crate.data.vertices[loop.vertex_index].co) - low
+        layer.uv[loop.index].vector = (x / size[0], y / size[1]) if z > size[2] / 2 else (0.0, 0.0)
+    set_input(obj, "Drying", 0.5)
+    set_input(obj, "Time Scale", 600.0)
+    mesh = at(scene, 84)
+    units, resolution = settings.units_of(scene), 512
+    (image,) = mark_images.floor_images(obj, [crate], units, resolution)
+    channels = image.at(84)
+    quads = np.array([tuple(face.vertices) for face in mesh.polygons])
+    area = np.array([face.area for face in mesh.polygons])
+    expected = (np.maximum(values(mesh, "mass"), 0.0)[quads].mean(axis=1) * area).sum()
+    shown_mass = channels[:, 0].sum() * size[0] * size[1] / resolution**2
+    assert shown_mass == pytest.approx(expected, rel=0.06)  # without the faces over its edge
+    assert 0 < channels[:, 1].max() <= 1.0
+    assert channels[-1].tolist() == [0.0, 0.0, NEVER]
+    assert channels[channels[:, 2] != NEVER, 2].min() == pytest.approx((84 - values(mesh, "birth").max()) / 24, abs=0.2)
+    assert (image.at(1)[:, 0] == 0.0).all()
+    scene.softground.ground.data.uv_layers.new()
+    paths = export_formats.export(
+        scene, export_formats.Options("EXR", tmp_path / "shot.exr", 84, 84, 64, outdated=True)
+    )
+    assert (tmp_path / "shot_marks_Crate_0084.exr") in paths
 
 
 def test_rain_keeps_marks_wet_and_washes_them_off(scene):

@@ -3,6 +3,7 @@
 import bmesh
 import bpy
 import pytest
+from mathutils import Matrix
 
 from softground_addon.blender.characters.selection import chosen, set_up_automatically
 from softground_addon.blender.reading.staleness import bodies_of
@@ -129,3 +130,36 @@ def test_a_body_that_moves_as_another_does_is_a_character_of_its_own(scene, who)
     select(walker, other)
     bpy.ops.softground.add_character()
     assert added(scene) == [walker, other]
+
+
+def hung(obj, rig, bone):
+    """Hang an object on a bone, where it is at rest."""
+    rest = rig.data.bones[bone]
+    obj.modifiers.clear()
+    obj.parent, obj.parent_type, obj.parent_bone = rig, "BONE", bone
+    obj.matrix_parent_inverse = (rest.matrix_local @ Matrix.Translation((0, rest.length, 0))).inverted()
+    obj.matrix_basis = Matrix.Identity(4)
+
+
+def test_shoes_that_hang_on_the_bones_of_feet_are_the_body_that_stands_on_them_and_a_staff_is_a_prop(scene):
+    walker = shots.walker(scene, frames=30)
+    body = walker.children[0]
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(0.9, 0, 0.3))
+    staff = bpy.context.object
+    staff.scale = (0.03, 0.03, 1.2)
+    bpy.ops.object.transform_apply(location=True, scale=True)
+    hung(staff, walker, next(bone.name for bone in walker.data.bones if bone.name.startswith("hand")))
+    set_up_automatically(scene)
+    whole, depths = prints(scene)
+    assert {contact[:4] for contact, *_ in whole} == {"foot"}
+    scene.softground.characters.clear()
+    feet = [group.name for group in body.vertex_groups if group.name.startswith(FEET)]
+    for bone in feet:
+        shoe = copy_of(body, f"Shoe {bone}")
+        cut(shoe, {bone}, keep=True)
+        hung(shoe, walker, bone)
+    cut(body, set(feet), keep=False)
+    set_up_automatically(scene)
+    parted, parted_depths = prints(scene)
+    assert parted == whole
+    assert parted_depths == pytest.approx(depths, rel=0.05)

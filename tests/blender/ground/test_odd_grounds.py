@@ -1,14 +1,11 @@
 """Grounds as artists have them: with physics, scatter and constraints, overhead, and under edit."""
 
-from types import SimpleNamespace
-from unittest.mock import MagicMock
-
 import bpy
 import pytest
 
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.panels import panels
+from softground_addon.blender.panels import ground_options_panel
 from tests.blender import fingerprints
 from tests.blender.grounds import as_rendered, bake, field, mover, node_group, refusal
 
@@ -144,17 +141,14 @@ def test_a_ground_that_the_user_shows_again_stays_shown(short_walk):
 def test_the_copy_that_shows_the_prints_is_selected_by_a_button_and_is_no_ground_of_its_own(short_walk):
     ground = field(short_walk)
     ground.select_set(True)
-    assert not bpy.ops.softground.select_shown.poll()
     bpy.ops.softground.bake()
     copy = baked_ground.display_mesh_of(ground)
     bpy.context.view_layer.objects.active = next(obj for obj in short_walk.objects if obj.type == "ARMATURE")
     copy.select_set(False)
-    assert bpy.ops.softground.select_shown() == {"FINISHED"}
+    assert bpy.ops.softground.open_settings(of="GROUND") == {"FINISHED"}
     assert bpy.context.selected_objects == [copy]
     assert bpy.context.active_object == copy
-    layout = MagicMock()
-    panels.SOFTGROUND_PT_ground.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
-    assert any(call.kwargs.get("text") == "Shown by Field Trail" for call in layout.operator.call_args_list)
+    assert ground_options_panel.SOFTGROUND_PT_of_ground.poll(bpy.context)
     assert bpy.ops.softground.use_as_ground() == {"FINISHED"}
     assert short_walk.softground.ground == ground
     with pytest.raises(RuntimeError, match="Select meshes to stand on, other than the ground"):
@@ -165,7 +159,7 @@ def test_the_copy_that_shows_the_prints_is_selected_by_a_button_and_is_no_ground
     short_walk.softground.ground = ground
     copy.hide_set(True)
     with pytest.raises(RuntimeError, match="'Field Trail' is hidden"):
-        bpy.ops.softground.select_shown()
+        bpy.ops.softground.open_settings(of="GROUND")
 
 
 def test_a_scatter_that_renders_only_is_in_the_way_in_no_viewport(short_walk):
@@ -271,3 +265,14 @@ def test_a_room_with_its_faces_inward_takes_prints_on_its_floor(short_walk):
     short_walk.frame_set(30)
     height = as_rendered(baked_ground.display_mesh_of(ground))[:, 2]
     assert -0.1 < height.min() < -0.02
+
+
+def test_a_ground_that_shows_nothing_but_instances_says_how_to_make_them_a_mesh(short_walk):
+    ground = field(short_walk)
+    tree, given, result = node_group()
+    points = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(given, points.inputs["Points"])
+    tree.links.new(given, points.inputs["Instance"])
+    tree.links.new(points.outputs[0], result)
+    ground.modifiers.new("Tiles", "NODES").node_group = tree
+    assert "let Realize Instances follow" in refusal(bpy.ops.softground.bake)

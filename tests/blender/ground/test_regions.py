@@ -190,6 +190,7 @@ def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(
 
 def test_the_panel_lists_materials_where_there_are_several_or_one_names_a_preset(four):
     context, ground = bpy.context, four.softground.ground
+    bpy.ops.softground.open_settings(of="GROUND")
     assert SOFTGROUND_PT_regions.poll(context)
     while len(ground.data.materials) > 1:
         ground.data.materials.pop()

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
+from softground_addon.blender import session
 from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.viewport import overlay, overlay_shapes
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record import record
 from tests.blender.shots import walker
+from tests.core.walkers import pressed, walk
+
+SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 
 
 def pairs(cells):
@@ -86,6 +92,15 @@ def test_the_directory_of_a_record_lies_in_its_tail(scene):
     bpy.ops.softground.bake()
     stored = bytes(baked_ground.stored_record(scene.softground.ground))
     assert stored.find(b"PK\x01\x02") > len(stored) - record.TAIL  # the first entry of the directory
+
+
+def test_early_prints_cover_their_cells_without_gaps_and_lie_above_the_ground():
+    _, (step, *_) = pressed(walk(steps=3), SNOW, 0.01)
+    corners = overlay.corners_of(step, session.Pressing("", FlatTerrain(0.5), None), bpy.context.scene)
+    first, second, third = corners.reshape(-1, 3, 3).transpose(1, 0, 2)
+    areas = np.linalg.norm(np.cross(second - first, third - first), axis=1) / 2
+    assert areas.sum() == pytest.approx(len(step.contact_cells) * step.cell_size**2)
+    assert corners[:, 2].min() >= 0.5 + step.cell_size
 
 
 def test_a_shot_that_is_forgotten_is_not_kept_by_what_was_drawn_of_it(short_walk):

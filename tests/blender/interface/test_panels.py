@@ -2,8 +2,10 @@
 
 import itertools
 import json
+import re
 import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -32,6 +34,8 @@ from softground_addon.core.loads.cell_limits import Coverage, Fineness
 from softground_addon.core.motion.motion import JOINTS
 from tests.blender.shots import import_motion, walker
 from tests.tiers import slow_but_one
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -91,9 +95,12 @@ def test_names_are_whole_in_a_sidebar_of_blender_s_own_width(addon, language):
 
 def test_panels_come_in_the_order_of_work(addon):
     every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
-    shown = [cls for cls in every if not hasattr(cls, "bl_parent_id")]
+    shown = [cls for cls in every if not getattr(cls, "bl_parent_id", "")]
     order = [cls.bl_label for cls in sorted(shown, key=lambda cls: getattr(cls, "bl_order", 0))]
-    assert order == ["Character", "Ground", "Look of Prints", "Bake", "Weather", "Steps", "Advanced"]
+    of_objects = ["SoftGround Character", "SoftGround Ground"]
+    assert [label for label in order if label not in of_objects] == [
+        *("Character", "Ground", "Look of Prints", "Feet", "Bake", "Weather", "Steps")
+    ]
 
 
 def drawn(panel):
@@ -101,7 +108,9 @@ def drawn(panel):
     layout = MagicMock()
     for part in ("row", "column", "box", "split"):
         getattr(layout, part).return_value = layout
-    panel.draw(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
+    for part in ("draw", "draw_header_preset"):
+        if hasattr(panel, part):
+            getattr(panel, part)(SimpleNamespace(layout=layout, fields=lambda: layout), bpy.context)
     return layout.method_calls, layout
 
 
@@ -127,16 +136,59 @@ def test_the_first_screen_is_a_score_of_controls(shot):
     assert 12 < len(controls) <= 20
 
 
-def test_with_everything_open_a_walking_figure_has_little_more_than_a_hundred_controls(shot):
-    def controls():
-        every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
-        sidebar = [cls for cls in every if cls.bl_region_type == "UI"]
-        shown = [cls for cls in sidebar if not hasattr(cls, "poll") or cls.poll(bpy.context)]
-        return sum(call[0] in CONTROLS for cls in shown for call in drawn(cls)[0])
+def controls(*, place="UI"):
+    """Number of controls of all panels of a region, with everything open."""
+    every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+    there = [cls for cls in every if cls.bl_region_type == place]
+    shown = [cls for cls in there if not hasattr(cls, "poll") or cls.poll(bpy.context)]
+    return sum(call[0] in CONTROLS for cls in shown for call in drawn(cls)[0])
 
-    assert controls() <= 105
+
+def test_with_everything_open_the_sidebar_of_a_walking_figure_has_at_most_60_controls(shot):
+    assert controls() <= 42
     bpy.ops.softground.bake()
-    assert controls() <= 120
+    assert controls() <= 54
+    bpy.ops.softground.add_weather()
+    assert controls() <= 60
+
+
+def test_the_settings_of_ground_and_character_stand_in_the_physics_of_each(shot):
+    walks = bpy.context.active_object
+    of_character, of_ground = (f"SOFTGROUND_PT_of_{part}" for part in ("character", "ground"))
+
+    def pages():
+        every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+        shown = [cls for cls in every if cls.bl_region_type == "WINDOW" and cls.poll(bpy.context)]
+        assert {cls.bl_context for cls in shown} <= {"physics"}
+        return {getattr(cls, "bl_parent_id", "") or cls.__name__ for cls in shown}
+
+    assert pages() == {of_character, of_ground}, "no ground is there to have its own page"
+    bpy.ops.softground.bake()
+    assert pages() == {of_character}
+    before = controls(place="WINDOW")
+    bpy.ops.softground.open_settings(of="GROUND")
+    assert bpy.context.active_object == shot.softground.ground
+    assert pages() == {of_ground}
+    assert max(before, controls(place="WINDOW")) <= 40
+    bpy.ops.softground.open_settings(of="CHARACTER")
+    assert bpy.context.active_object == walks
+    assert pages() == {of_character}
+    bpy.ops.mesh.primitive_cube_add()
+    assert pages() == set()
+
+
+def test_a_character_that_is_not_chosen_is_chosen_in_its_physics(shot):
+    second = walker(shot, frames=60)
+    bpy.ops.object.select_all(action="DESELECT")
+    second.select_set(True)
+    bpy.ops.softground.add_character()
+    assert panels.SOFTGROUND_PT_soles.poll(bpy.context)
+    shot.softground.active_character = 0
+    assert panels.SOFTGROUND_PT_of_character.poll(bpy.context)
+    assert not panels.SOFTGROUND_PT_soles.poll(bpy.context)
+    calls, layout = drawn(panels.SOFTGROUND_PT_of_character)
+    assert [call[1][0] for call in calls if call[0] in CONTROLS] == ["wm.context_set_int"]
+    assert (layout.operator().data_path, layout.operator().value) == ("scene.softground.active_character", 1)
 
 
 def test_a_joint_of_the_body_is_chosen_in_a_list_and_given_its_bone(shot):
@@ -177,14 +229,23 @@ def test_a_bake_brings_steps_and_weather(shot):
     assert all(panel.poll(bpy.context) for panel in of_a_bake)
 
 
-def test_all_else_is_closed_under_advanced(addon):
+def test_all_else_is_closed(addon):
     every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
-    below = [cls for cls in every if getattr(cls, "bl_parent_id", "")]
-    assert {cls.bl_parent_id for cls in below} == {"SOFTGROUND_PT_advanced", "SOFTGROUND_PT_response"}
-    closed = [cls for cls in every if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())]
-    assert {cls.bl_label for cls in closed} == {cls.bl_label for cls in below} | {
-        *("Look of Prints", "Weather", "Steps", "Advanced")
-    }
+    open_ones = [cls for cls in every if "DEFAULT_CLOSED" not in getattr(cls, "bl_options", ())]
+    assert {cls.bl_label for cls in open_ones} == {"Character", "Ground", "Bake", "SoftGround"}
+    assert [cls.bl_region_type for cls in open_ones if cls.bl_label == "SoftGround"] == ["HEADER"]  # of the overlays
+
+
+def test_where_docs_and_messages_say_that_a_setting_is_there_is_a_panel(addon):
+    every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+    below = {"Physics": [cls.bl_label for cls in every if cls.bl_region_type == "WINDOW"]}
+    below |= {"Feet": ["Hard Ground"], "Bake": ["Output"]}
+    place = re.compile(rf"\b({'|'.join(below)}) > ([A-Z][\w-]+(?: [\w-]+)*)")
+    named = []
+    for path in (*(ROOT / "docs").glob("**/*.md"), *(ROOT / "softground_addon").glob("**/*.py")):
+        named += place.findall(re.sub(r'"\s+f?"', "", path.read_text(encoding="utf-8")))
+    assert len(named) > 50
+    assert [where for where in named if not where[1].startswith(tuple(below[where[0]]))] == []
 
 
 def test_the_material_is_shown_in_field_units(shot):
@@ -252,7 +313,7 @@ def test_acting_is_offered_where_a_bake_lowers_the_feet(shot, sinks):
     columns = [MagicMock() for _ in range(8)]
     layout = MagicMock()
     layout.column.side_effect = columns
-    response_panel.SOFTGROUND_PT_response.draw(SimpleNamespace(fields=lambda: layout), bpy.context)
+    response_panel.SOFTGROUND_PT_feet.draw(SimpleNamespace(fields=lambda: layout), bpy.context)
     acting = next(column for column in columns if any("knee_lift" in call.args for call in column.prop.call_args_list))
     assert acting.active is sinks
 
@@ -401,8 +462,10 @@ def test_a_preset_of_one_s_own_comes_back_as_it_was_saved(shot, user_folder):
     bpy.ops.softground.save_preset(name="Beach at Noon", source="measured with a stick")
     (path,) = user_folder.glob("*.json")
     assert presets.load(path).source == "measured with a stick"
+    assert "Remove Ground Preset" in rows_of_the_menu()[0]
     bpy.ops.softground.load_preset(name="Snow")
     assert not bpy.ops.softground.remove_preset.poll()
+    assert "Remove Ground Preset" not in rows_of_the_menu()[0]
     bpy.ops.softground.load_preset(filepath=str(path))
     assert shot.softground.material.youngs_modulus == pytest.approx(123e3)
     bpy.ops.softground.remove_preset()

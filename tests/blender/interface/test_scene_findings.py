@@ -170,3 +170,18 @@ def test_a_frame_handler_that_moves_the_rig_is_named_and_another_is_not(short_wa
         assert [finding["code"] for finding in report["self_check"]] == said
         assert all(f"a frame handler of '{__name__}'" in finding["message"] for finding in report["self_check"])
         bpy.ops.softground.clear_bake()
+
+
+@pytest.mark.parametrize("where", ["another scene", "an instance of its collection", "this scene"])
+def test_a_ground_whose_prints_are_not_seen_in_the_scene_is_said(short_walk, where):
+    ground = plane(short_walk)
+    if where != "this scene":
+        short_walk.collection.objects.unlink(ground)
+        parts = bpy.data.collections.new("Set")
+        parts.objects.link(ground)
+        shown = bpy.data.objects.new("Set", None)
+        shown.instance_type, shown.instance_collection = "COLLECTION", parts
+        scene = short_walk if where == "an instance of its collection" else bpy.data.scenes.new("Other")
+        scene.collection.objects.link(shown)
+    codes = {one["code"] for one in bake(short_walk, ground=ground).report["self_check"]}
+    assert ("unseen_ground" in codes) == (where == "another scene")

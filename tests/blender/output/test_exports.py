@@ -194,6 +194,16 @@ def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_pa
     assert (scene.frame_start, scene.frame_end, scene.frame_current_final) == (*frames, 7.25)
 
 
+@pytest.mark.parametrize("export", [exports.export_point_cache, exports.export_alembic, exports.export_usd])
+def test_progress_counts_the_frames_that_are_written(scene, ground, tmp_path, export, monkeypatch):
+    shown, before = [], list(bpy.app.handlers.frame_change_post)
+    monkeypatch.setattr(exports, "_show", shown.append)
+    export(ground, tmp_path / f"ground.{'usdc' if export is exports.export_usd else 'abc'}", *FRAMES)
+    assert set(np.arange(1, 32) / 31) <= set(shown)
+    assert list(dict.fromkeys(shown)) == sorted(set(shown))
+    assert bpy.app.handlers.frame_change_post == before
+
+
 @pytest.mark.parametrize("kind", ["abc", "usdc"])
 def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, kind):
     export, read = {

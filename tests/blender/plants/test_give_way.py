@@ -194,6 +194,19 @@ def test_before_the_first_step_it_is_the_scatter_and_so_it_is_without_the_modifi
     assert data is None or fingerprints.of_mesh(obj.data) == data
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_scatter_that_no_sole_touches_passes_as_it_is(shot, kind):
+    """Not copied, and without anything stored."""
+    obj = KINDS[kind](roots() + np.array((20.0, 0.0, 0.0)))
+    before = state(obj)
+    give_way(obj)
+    shot.frame_set(60)
+    assert state(obj) == before
+    if kind != "instances":
+        shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        assert give_way_nodes.BENT not in shown.attributes
+
+
 def test_frames_play_in_any_order_with_sub_frames(shot):
     grass = hair(roots())
     give_way(grass)

@@ -17,6 +17,7 @@ from softground_addon.blender import ground_presets, jobs, preset_files, setting
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import staleness
+from softground_addon.blender.remedies import said
 from softground_addon.core.carving import carves
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
@@ -344,8 +345,9 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
 def test_a_bake_is_refused_that_carving_makes_too_long(scene, monkeypatch):
     walker(scene, **DEEP)
     monkeypatch.setattr("softground_addon.core.loads.cell_limits.CARVED", 1e6)
-    with pytest.raises(InputError, match=r"Legs carve deep ground\. .*Or turn Carve off"):
+    with pytest.raises(InputError, match=r"Legs carve deep ground\. .*Or do without carving") as caught:
         bake(scene)
+    assert "Or turn Carve off" in said(caught.value)
     scene.softground.material.youngs_modulus = 10e6
     assert not bake(scene)[1].carves
 

@@ -534,7 +534,7 @@ def test_no_stored_property_makes_a_traceback(count, forgeable):
         try:
             assert isinstance(bake_report.stale_reasons(scene), tuple)
             assert handlers.compare_bake() is None
-            for panel in (panels.SOFTGROUND_PT_bake, response_panel.SOFTGROUND_PT_response):
+            for panel in (panels.SOFTGROUND_PT_bake, response_panel.SOFTGROUND_PT_feet):
                 panel.draw(drawn(), bpy.context)
             with contextlib.suppress(InputError):
                 baked_ground.load(scene.softground.ground)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from library.softground.plates import free_moment
+from library.softground.readers import c3d_mass
 from softground_addon.core.capture import c3d
 from softground_addon.core.errors import InputError
 from tests.core.capture.c3d_files import DEC, INTEL, SGI, c3d_file
@@ -63,6 +64,38 @@ def test_markers_and_plates_are_those_of_ezc3d(tmp_path, processor, scale, kind)
     np.testing.assert_allclose(ours.moment * 1e3, platform["moment"].T, atol=1e-6)
     np.testing.assert_allclose(ours.centre_of_pressure() * 1e3, platform["center_of_pressure"].T, atol=1e-6)
     np.testing.assert_allclose(free_moment(ours) * 1e3, platform["Tz"].T[:, 2], atol=1e-6)
+
+
+def test_a_file_that_ezc3d_wrote_holds_its_markers_and_the_force_of_two_plates(tmp_path):
+    """Bodies of 700 and 300 N on plates whose z points down, at (0.1, 0.2) m of the first and in the middle of both."""
+    ezc3d = pytest.importorskip("ezc3d")
+    file, where = ezc3d.c3d(), points()[:, [0, 1, 3, 4]]
+    about = file["parameters"]
+    about["POINT"]["RATE"]["value"], about["POINT"]["UNITS"]["value"] = [100.0], ["mm"]
+    about["POINT"]["LABELS"]["value"] = ["LASI", "RASI", "LHEE", "RHEE"]
+    about["ANALOG"]["RATE"]["value"] = [100.0 * SAMPLES]
+    about["ANALOG"]["LABELS"]["value"] = [
+        f"{axis}{number}" for number in (1, 2) for axis in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    ]
+    about["ANALOG"]["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * 2
+    file["data"]["points"] = np.append(where.transpose(2, 1, 0), np.ones((1, 4, FRAMES)), axis=0)
+    middle = CORNERS.mean(axis=0)[:2]
+    x, y = np.array((100.0, 200.0)) - middle
+    channels = np.array([0, 0, -700, 700 * y, 700 * x, 0, 5, 0, -300, 0, 0, 0])  # y of the plates is -y here
+    file["data"]["analogs"] = np.tile(channels[None, :, None], (1, 1, FRAMES * SAMPLES)).astype(float)
+    corners = np.stack([CORNERS, CORNERS + np.array([700, 0, 0])], axis=-1).transpose(1, 0, 2)[:, [3, 2, 1, 0]]
+    plates = {"USED": [2], "TYPE": [2, 2], "ZERO": [1, 0], "CORNERS": corners, "ORIGIN": np.zeros((3, 2))}
+    for name, value in (plates | {"CHANNEL": np.arange(1.0, 13.0).reshape(2, 6).T}).items():
+        file.add_parameter("FORCE_PLATFORM", name, value)
+    file.add_parameter("SUBJECTS", "MASS", [70.5])
+    file.write(str(tmp_path / "trial.c3d"))
+    content = (tmp_path / "trial.c3d").read_bytes()
+    capture = c3d.read(content)
+    assert (capture.labels, capture.rate) == (("LASI", "RASI", "LHEE", "RHEE"), 100.0)
+    assert c3d_mass(content) == pytest.approx(70.5)
+    np.testing.assert_allclose(capture.points * 1e3, where, atol=1e-4)
+    assert [float(ours.force[0, 2]) for ours in capture.plates] == pytest.approx([700.0, 300.0])
+    np.testing.assert_allclose(capture.plates[0].centre_of_pressure()[0], (0.1, 0.2, 0.0), atol=1e-6)
 
 
 @pytest.mark.parametrize("processor", [INTEL, DEC, SGI])

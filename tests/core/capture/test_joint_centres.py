@@ -141,6 +141,26 @@ def test_a_trc_file_holds_the_same_body():
 
 
 @pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        (b"PathFileType\t4\t", b"PathFileType  4\t"),  # Motion Analysis, which also pads its numbers
+        (b"100.00\t100.00\t30\t20\tmm", b"  100.0 \t  100.0 \t     30 \t     20 \tmm \t  100.0 \t      1 \t    30"),
+        (b"\nFrame#", b"\t100.00\t1\t30\t\t\nFrame#"),  # OpenSim's own
+        (b"\n", b"\r\n"),
+        (b"\tZ1\n\n", b"\tZ1\n"),  # without an empty line before the first frame, or with several
+        (b"\tZ1\n\n", b"\tZ1\n\n\n"),
+    ],
+    ids=["spaces", "padded", "trailing tabs", "Windows", "no empty line", "empty lines"],
+)
+def test_trc_files_are_read_as_programs_write_them(ours, theirs):
+    content = trc_file(centres())
+    assert ours in content
+    read = trc.read(content.replace(ours, theirs))
+    assert (read.labels, read.rate, len(read.points)) == (tuple(centres()), 100.0, FRAMES)
+    np.testing.assert_array_equal(read.points, trc.read(content).points)
+
+
+@pytest.mark.parametrize(
     ("content", "words"),
     [
         (b"", "no TRC file"),

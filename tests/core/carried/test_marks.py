@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid
+from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid, swept
 from softground_addon.core.carried.marks import _pieces, marks_of
+from softground_addon.core.events.events import events
 from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.surfaces import LIQUIDS
@@ -15,6 +16,7 @@ from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.record.record import steps_of
 from tests.core.ground.test_hard_ground import SNOW, lifted, slab, standing_on
+from tests.core.prop_bodies import rolling
 from tests.core.walkers import box_sole, foot_sole, pose, pressed, walk
 
 FLOOR = 0.1
@@ -121,6 +123,56 @@ def test_a_sole_that_slides_on_leaves_a_mark_for_each_of_its_lengths():
     assert [len(list(_pieces(hard, 0.0 * slid))), len(list(_pieces(~hard, slid)))] == [1, 1]
 
 
+def rolled(turns=3.6, onto=1.0, radius=0.2, slide=False):
+    """Marks of a wheel that rolls out of mud onto a floor, and the motion."""
+    speed = 1.5
+    loads = rolling(30.0, speed, (onto + turns * 2 * np.pi * radius) / speed, radius, slide=slide)
+    # The floor is level with the mud that it lies on.
+    floor = HardOnSoft(FlatTerrain(-0.05), slab((onto, 99), (-1, 1), 0.0), Reach.of(np.zeros((1, 3)) + 0.5, 99.0))
+    hard = loads.motion.soles[0].transforms[:, 0, 0, 3] > onto
+    contacts = replace(loads.contacts, touching=loads.contacts.touching & ~hard[:, None], hard=hard[:, None])
+    loads = replace(loads, contacts=contacts)
+    name, sole = loads.motion.name, loads.motion.soles[0].sole.name
+    found = marks_of([loads], [], floor, surface="mud", brought={name: 1.0})
+    assert sole == found.floors.soles[0].of[1]
+    return found, loads
+
+
+def test_a_wheel_leaves_a_strip_that_fades_by_the_closed_form_with_each_turn():
+    found, _ = rolled()
+    place, of_turn = found.position[:, 0], mass_of_steps(found)
+    for number in range(3):
+        of_step = place[found.step == number]
+        assert np.ptp(of_step) == pytest.approx(2 * np.pi * 0.2, abs=0.03)
+        assert number == 0 or abs(of_step.min() - place[found.step == number - 1].max()) < 0.03
+    assert np.diff(np.log(of_turn[:3])) == pytest.approx(np.log(of_turn[1] / of_turn[0]), abs=0.01)
+    assert of_turn[3] < of_turn[2]
+    across = found.position[found.mass > 0, 1]
+    assert np.ptp(across) == pytest.approx(0.06, abs=0.02)
+    carried = found.carried
+    assert of_turn.sum() == pytest.approx(carried.left_behind, abs=1e-9)
+    assert carried.brought == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
+    assert np.polyfit(place[found.step == 1], found.birth[found.step == 1], 1)[0] == pytest.approx(30 / 1.5, rel=0.05)
+
+
+def test_a_body_that_slides_on_smears_and_one_that_rests_leaves_its_underside():
+    smeared, _ = rolled(slide=True)
+    assert len(np.unique(smeared.step)) > 5
+    loads = rolled()[1]
+    still = replace(loads.motion, soles=(loads.motion.soles[0].of(np.full(60, len(loads.motion.frames) - 1)),))
+    print_ = swept(
+        still.soles[0].sole.prop,
+        still.soles[0].transforms[:, 0],
+        np.full(60, 400.0),
+        HardOnSoft(FlatTerrain(-1.0), slab((-9, 99), (-1, 1), 0.0), Reach.of(np.zeros((1, 3)), 99.0)),
+        0.05,
+    )[1]
+    pressed_x = print_.position[print_.pressure > 0, 0]
+    pushed = 400.0 / (BEDDING * 0.06)  # Winkler's foundation under a cylinder: F = (4/3) k b sqrt(2 R) d^1.5
+    half = np.sqrt(2 * 0.2 * (0.75 * pushed / np.sqrt(2 * 0.2)) ** (2 / 3))
+    assert np.ptp(pressed_x) == pytest.approx(2 * half, abs=0.03)
+
+
 def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
     loads, footprints, terrain = crossing()
     assert marks("sand") is None
@@ -180,6 +232,46 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
         assert carried == anew.carried
         assert carried.picked_up == pytest.approx(carried.left_behind + carried.shed + carried.on_soles, abs=1e-9)
         assert mass_of_steps(updated).sum() == pytest.approx(carried.left_behind, abs=1e-9)
+
+
+def test_a_step_that_is_shifted_before_earlier_contacts_with_the_floor_leaves_marks_there():
+    loads, footprints, terrain = crossing()
+    late = [replace(step, end_frame=step.end_frame + 500, start_frame=step.start_frame + 500) for step in footprints]
+    steps = steps_of(late, {}, {}, {})
+    found = marks_of([loads], steps, terrain, surface="mud")
+    assert not found.mass.any()
+    early = [replace(step, footprint=before) for step, before in zip(steps, footprints, strict=True)]
+    moved, usual = found.with_steps(early, {}), marks()
+    assert moved.carried == usual.carried
+    assert np.sort(moved.mass[moved.mass > 0]) == pytest.approx(np.sort(usual.mass[usual.mass > 0]))
+
+
+def test_events_on_a_floor_know_what_soles_bring_less_with_each_step_and_none_if_steps_are_muted():
+    loads, footprints, _ = crossing()
+    table = events([loads], footprints, surface="mud", first_frame=1.0)
+    steps, found = steps_of(footprints, {}, {}, {}), marks()
+    rows = found.floors.with_films(table, steps)
+    hard = [row for row in rows if row["surface"] == "hard" and row["phase"] == "heel_strike"]
+    assert len(hard) > 3
+    assert {row["carried"] for row in hard} == {"mud"}
+    for contact in {row["contact"] for row in hard}:
+        film = [row["film"] for row in hard if row["contact"] == contact]
+        assert np.diff(film).max() < 0
+    assert not [row for row in rows if row["surface"] != "hard" and row["carried"]]
+    muted = [replace(step, footprint=None) for step in steps]
+    assert not any(row["film"] for row in found.floors.with_films(table, muted))
+
+
+def test_more_may_stick_and_it_may_go_farther():
+    usual, more, farther = (mass_of_steps(marks(carried=scaled)) for scaled in ((1.0, 1.0), (2.0, 1.0), (1.0, 3.0)))
+    assert more == pytest.approx(2 * usual)
+    one_foot = slice(1, 3)  # of equal steps each leaves the same share
+    assert np.divide(*farther[one_foot]) < np.divide(*usual[one_foot])
+    assert np.count_nonzero(farther) >= np.count_nonzero(usual)
+    found = marks(carried=(2.0, 3.0))
+    carried = found.carried
+    assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
+    assert found.with_steps(steps_of(crossing()[1], {}, {}, {}), {}).mass == pytest.approx(found.mass)
 
 
 @pytest.mark.parametrize("ground", ["sand", "snow"])

@@ -81,7 +81,7 @@ def test_feet_that_stand_level_on_a_slope_want_stairs_and_not_a_ground_of_anothe
     loads = replace(loads, contacts=replace(loads.contacts, normal=normal))
     findings = findings_of(loads, Slope(slope=0.4))
     assert findings.keys() == {code}
-    assert ("slopes by 22°" in findings[code].message) == ("Use Selected" in findings[code].remedy) == (not turned)
+    assert ("slopes by 22°" in findings[code].message) == ("mesh of them" in findings[code].remedy) == (not turned)
     skeleton = replace(loads, motion=replace(loads.motion, skin=None, stature=STATURE))
     assert findings_of(skeleton, Slope(slope=0.4)).keys() == ({"level_on_slope"} if not turned else set())
 
@@ -96,6 +96,39 @@ def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_
     alone.rise[len(frames) // 2 :, :2] = 1.0  # from there on it stands on the other, which does not print
     other = replace(loads, motion=replace(loads.motion, skin=alone))
     assert findings_of(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
+
+
+def named(loads, bones, soles):
+    skin = replace(loads.motion.skin, bones=bones, soles=soles)
+    return replace(loads, motion=replace(loads.motion, skin=skin))
+
+
+def test_each_contact_is_judged_by_its_own_skin_and_named():
+    """A foot without a print is not covered by the other one beside it, and a tail wants one, too."""
+    apart = np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [-0.4, 0.0, 0.0]])
+    loads = named(stands(apart, apart[:2]), ("foot.L", "foot.R", "tail"), ("left", "right", ""))
+    said = findings_of(loads)
+    assert said.keys() == {"skin_without_step"}
+    assert said["skin_without_step"].severity == "warning"
+    assert "'tail' of" in said["skin_without_step"].message
+    near = np.add(apart, [[0, 0, 0], [0, 0, 0], [0.35, 0.1, 0]])  # a heel of the left foot
+    assert not findings_of(named(stands(near, apart[:2]), ("foot.L", "foot.R", "heel"), ("left", "right", "")))
+    touching = loads.contacts.touching.copy()
+    touching[:, 1] = False
+    missing = replace(loads, contacts=replace(loads.contacts, touching=touching))
+    assert "'right', 'tail' of" in findings_of(missing)["skin_without_step"].message
+    aloft = np.add(apart[:2], [[0, 0, 0.1], [0, 0, 0]])
+    over = named(stands(aloft, apart[:2]), ("foot.L", "foot.R"), ("left", "right"))
+    assert "'left' of" in findings_of(over)["step_without_skin"].message
+
+
+def test_feet_that_slide_or_swing_low_want_no_print_of_their_own():
+    loads = named(stands(), ("foot.L", "foot.R"), ("left", "right"))
+    touching = loads.contacts.touching.copy()
+    touching[:, 1] = False
+    skin = loads.motion.skin
+    skin.position[:, 1, 0] += np.linspace(0, 0.5 * STATURE, len(skin.frames)) * 4
+    assert "skin_without_step" not in findings_of(replace(loads, contacts=replace(loads.contacts, touching=touching)))
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.12, False), (0.18, True)])

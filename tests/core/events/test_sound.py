@@ -148,6 +148,24 @@ def test_micro_impacts_follow_the_ground_that_gives_way(grounds):
     assert at.max() <= middle + 0.01
 
 
+def test_wet_soles_squeak_as_they_leave_a_floor_muddy_ones_squelch_and_sand_grinds(loads):
+    rows = [row | {"surface": "hard", "step": ""} for row in events([loads], [], surface="snow", first_frame=1.0)]
+    clean = sound.steps_of({}, rows, frame_rate=30.0, first_frame=1.0)[0]
+    begin, heard = sound.step_sound(clean)
+
+    def added(kind, film):
+        return sound.step_sound(replace(clean, carried=kind, film=film))[1] - heard
+
+    time = (begin + np.arange(len(heard))) / RATE - clean.lifted
+    for kind, (low, high) in {"water": (1000, 4500), "mud": (250, 1200)}.items():
+        loud, quiet = added(kind, 1.0), added(kind, 0.1)
+        assert not loud[np.abs(time) > sound.SQUEAK].any()
+        assert low < centroid(loud) < high
+        assert 0 < np.abs(quiet).max() < 0.5 * np.abs(loud).max()
+        assert not added(kind, 0.0).any()
+    assert lasting(added("sand", 1.0)) > lasting(added("water", 1.0))
+
+
 def test_no_two_steps_are_alike_and_the_same_bake_gives_the_same_bytes(grounds):
     steps = grounds["snow"][1]
     once, again = (wave_file.dump(sound.footsteps(steps, 3.0)) for _ in range(2))

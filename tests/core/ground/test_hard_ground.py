@@ -11,6 +11,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.loads.raised_rests import raised_rests, reach_of
+from tests.core.prop_bodies import rolling
 from tests.core.walkers import pressed, walk
 
 SNOW = GroundMaterial(youngs_modulus=375e3, poisson_ratio=0.05, characteristic_time=0.2)
@@ -46,6 +47,16 @@ def test_the_highest_surface_within_reach_counts_for_each_place():
     assert np.isnan(bare(terrain).heights(x, y)).tolist() == [True, False, False, False]
     above = HardOnSoft(FlatTerrain(), terrain.hard, Reach.of(np.array([[0.5, 0.5, 2.1]]), 1.0))
     assert above.heights(x, y).tolist() == [2.0, 2.0, 0.0, 0.0]
+
+
+def test_a_wheel_that_rolls_onto_a_slab_is_on_it_from_where_it_reaches_it():
+    motion = rolling(30.0, seconds=2.0).motion
+    terrain = standing_on([motion], slab((1.0, 9.0), (-1, 1), 0.0))
+    loads = estimate_loads(motion, terrain, force_model="IMPULSE", material=SNOW)
+    contacts, x = loads.contacts, loads.motion.soles[0].transforms[:, 0, 0, 3]
+    assert contacts.hard[x > 1.1, 0].all()  # as far as it is still close to the soft ground behind it
+    assert contacts.touching[x < 1.0, 0].all()
+    assert not (contacts.hard & contacts.touching).any()
 
 
 def test_a_ground_below_a_bridge_is_pressed_bit_for_bit_as_without_it():

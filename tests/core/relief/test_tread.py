@@ -12,7 +12,7 @@ from softground_addon.core.relief import tread_map
 from softground_addon.core.relief.amounts import Amounts, Tread
 from softground_addon.core.relief.print_relief import ARCH, FLESH, relief_of_print
 from softground_addon.core.relief.print_shape import shape_of
-from softground_addon.core.relief.tread import _PADS, LENGTH, PATTERNS, SoleTread, Under, bare, of_map
+from softground_addon.core.relief.tread import LENGTH, PADS, PATTERNS, SoleTread, Under, bare, of_map
 from tests.core.relief.test_steps import MATERIALS, steps_on
 from tests.core.walkers import box_sole
 
@@ -99,7 +99,7 @@ def test_a_bare_foot_is_on_its_heel_ball_and_five_toes_and_not_on_its_arch():
 
 
 def test_ground_stands_between_toes():
-    toes = _PADS[-5:, :2]
+    toes = PADS[-5:, :2]
     for toe, other in pairwise(toes):
         line = toe + (other - toe) * np.linspace(0.0, 1.0, 101)[:, None]
         stands = bare(under(line[:, 0] * LENGTH, line[:, 1] * 0.1))

@@ -24,7 +24,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     write_action(armature, on_the_spot(), "On the Spot")
     with_viewport(hand, bpy.ops.softground.add_character)
     facts["travel"] = [travel(armature)]
-    panel = bpy.types.SOFTGROUND_PT_response
+    panel = bpy.types.SOFTGROUND_PT_feet
     show_alone(panel, tab=panel.bl_label)
     yield from hand.open_sidebar(panel.bl_label)
     yield from hand.press_button("softground.root_motion", offset=0.75)
@@ -53,7 +53,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.key("Z", ctrl=True, shift=True)
     yield 0.5
 
-    yield from hand.open_sidebar("Response")
+    yield from hand.open_sidebar("Feet")
     yield from hand.press_button("softground.clean_feet", offset=0.25)
     yield from done(hand)
     armature = scene().softground.characters[0].armature

@@ -155,9 +155,10 @@ def pressed(hand: Hand) -> Steps:
 
 def show_alone(panel: type, tab: str = "") -> None:
     """Show a panel once more, open and beside the others or in a tab: what a region has closed stays closed."""
-    parts = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "draw", "draw_header")
+    parts = ("bl_label", "bl_category", "draw", "draw_header")
     values = {name: getattr(panel, name) for name in parts if hasattr(panel, name)}
     shown = {"bl_idname": f"TEST_PT_alone_{tab.replace(' ', '_')}", "bl_options": set(), "bl_parent_id": ""}
+    shown |= {"bl_space_type": "VIEW_3D", "bl_region_type": "UI", "bl_context": ""}
     shown |= values | ({"bl_category": tab} if tab else {})
     bpy.utils.register_class(type(shown["bl_idname"], panel.__bases__, shown))
 

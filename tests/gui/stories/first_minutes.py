@@ -63,7 +63,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["height"], facts["scrolled by"] = hand.region().height, top_of(hand) - before
 
     # another ground
-    add = yield from hand.find_button("softground.save_preset", offset=0.76)
+    add = yield from hand.find_button("softground.save_preset", offset=0.83)
     facts["snow"] = looks(ground), title()
     yield from hand.choose_in_menu((add[0] - 120, add[1]), "M")
     yield from hand.wait_for(lambda: bool(session().stale), 10)

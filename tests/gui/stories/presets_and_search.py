@@ -30,7 +30,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     bpy.data.objects["Walker"].select_set(False)
 
     scene().softground.material.stiffness_mpa = 0.123
-    yield from hand.press_button("softground.save_preset", offset=0.76)
+    yield from hand.press_button("softground.save_preset", offset=0.83)
     yield 0.5
     yield from hand.picture("save_preset", in_docs=False)
     yield from hand.key("RET")
@@ -41,13 +41,13 @@ def tell(hand: Hand, facts: dict) -> Steps:
     facts["modified"] = title()
     scene().softground.material.stiffness_mpa = 0.123
     facts["as saved"] = title()
-    place = yield from hand.find_button("softground.save_preset", offset=0.76)
+    place = yield from hand.find_button("softground.save_preset", offset=0.83)
     yield from hand.click(place[0] - 120, place[1])
     yield 0.7
     yield from hand.picture("own_preset", in_docs=False)
     yield from hand.key("ESC")
     yield 0.3
-    yield from hand.press_button("softground.remove_preset", offset=0.83)
+    with_viewport(hand, bpy.ops.softground.remove_preset)
     yield 0.3
     facts["removed"] = presets()
     facts["kept stiffness"] = scene().softground.material.stiffness_mpa

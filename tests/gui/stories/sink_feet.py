@@ -42,10 +42,10 @@ def tell(hand: Hand, facts: dict) -> Steps:
     facts["layers"] = layers(armature)
     facts["stale"] = session().stale
 
-    show_open(bpy.types.SOFTGROUND_PT_response)
+    show_open(bpy.types.SOFTGROUND_PT_feet)
     for _ in range(24):
         yield from hand.key("WHEELUPMOUSE")
-    yield from hand.picture("panel_response", in_docs=False)
+    yield from hand.picture("panel_feet", in_docs=False)
 
     yield from hand.move(*hand.middle())
     yield from hand.key("Z", ctrl=True)
@@ -85,4 +85,4 @@ def show_open(panel: type) -> None:
     bpy.utils.register_class(type("TEST_PT_open", panel.__bases__, shown | values))
 
 
-_PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "bl_parent_id")
+_PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category")

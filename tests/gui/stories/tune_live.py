@@ -18,7 +18,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.3
     facts["ground"] = scene().softground.ground.name
 
-    place = yield from hand.find_button("softground.save_preset", offset=0.76)
+    place = yield from hand.find_button("softground.save_preset", offset=0.83)
     menu = (place[0] - 120, place[1])
     yield from hand.click(*menu)
     yield 0.5
