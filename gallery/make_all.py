@@ -18,6 +18,8 @@ HEROES = (
     "powder_runner",
     "bare_feet",
     "fox_in_powder",
+    "wading",
+    "dog_in_snow",
     "before_after",
     "time_lapse",
 )

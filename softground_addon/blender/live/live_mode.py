@@ -264,7 +264,8 @@ class LiveMode:
             made_with = with_shoe_treads(made_with, shot.motions)
         movers, name = staleness.of_movers(scene.objects, made_with), settings.name_of(ground)
         footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
-        if made_with.carves and any(map(is_deep, footprints)):
+        bodies = {motion.name for motion in shot.motions if motion.joints}
+        if made_with.carves and any(is_deep(print) for print in footprints if print.character in bodies):
             made_with = replace(made_with, carve=False)  # live mode carves nothing
         yield now
         vertices = ground_surface.rest_vertices(settings.resolve(name), made_with.unit_scale_m, made_with.frame)

@@ -86,8 +86,6 @@ class CarvedStep:
 
 
 def is_deep(footprint: Footprint) -> bool:
-    """True if a foot sank beyond its ankle."""
+    """True if a foot sank beyond its ankle, or a hand or knee as far for its length."""
     made_by = footprint.pressed_by
-    if made_by is None or made_by.pressing.sole.prop is not None:
-        return False
-    return bool(wading(footprint.max_depth_m, made_by.pressing.sole.length) > 0)
+    return bool(made_by and wading(footprint.max_depth_m, made_by.pressing.sole.length) > 0)

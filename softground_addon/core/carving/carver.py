@@ -1,7 +1,8 @@
 """Deep ground that a body passes through: it is cut to the lowest underside, and what was cut lies loose around.
 
-Over the pressed ground T, every cell keeps the lowest underside K that passed it and the loose matter l on it: what
-stands is min(T, K), the surface is min(T, K) + l. A cut takes loose matter first. A part of it all is packed into the
+Over the pressed ground T, every cell keeps the lowest undersides K that passed its quarters and the loose matter l on
+it: what stands is the middle of their min(T, K), the surface lies l above that. So the outline of a hole is smooth. A
+cut takes loose matter first. A part of it all is packed into the
 wall, as its pores close; the rest is laid around. Loose matter slides at its angle of repose, and walls fall that
 are higher than their cohesion holds: of dry sand all, of snow and mud hardly any.
 
@@ -24,13 +25,17 @@ from ..pressing.repose import slid
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
-UNDER_SOLE = 0.01
-"""The same of a sole that presses, or a cell if that is less: within it the print is what the solver says, and the skin
-about that [m]; where the soft edge of a print stands out above the skin of the shoe, the shoe has cut it."""
+UNDER_SOLE = 7e-3
+"""The same of a sole that presses, or a cell if that is less [m]: within it the print is what the solver says, and the
+skin about that, within a centimetre with what is not recorded yet; where the soft edge of a print stands out above the
+skin of the shoe, the shoe has cut it."""
+SAMPLES = 2
+"""Quarters along each side of a cell."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
-THICKEST, LAYERS = 0.04, 3
-"""Loose matter is laid up to this thickness [m], and under what hovers over it, in so many goes; then anywhere."""
+THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
+"""Loose matter is laid up to a thickness [m], and under what hovers over it, in so many goes; then up to twice that;
+then anywhere."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 REACH = 0.04
@@ -92,12 +97,12 @@ class CarvedCells:
         Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
     pressed : (rows, columns) float array
         Height of the pressed ground T, with its rims [m].
-    lowest : (rows, columns) float array
-        Lowest underside K so far [m], infinite where none passed.
+    lowest : (4, rows, columns) float array
+        Lowest underside K so far in the quarters of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
         Height of the loose matter [m].
     cut_height, packed, unplaced : float
-        Sums of the heights that were cut of what stood or fell, packed, and found no place around [m].
+        Sums of the heights that were cut of what stood, fell or rose as a rim, packed, and found no place around [m].
     """
 
     cell_size: float
@@ -113,8 +118,8 @@ class CarvedCells:
 
     @property
     def standing(self) -> Array:
-        """Height of what stands, (rows, columns) [m]."""
-        return np.minimum(self.pressed, self.lowest)
+        """Height of what stands, (rows, columns) [m]: the middle of its quarters."""
+        return _middle(np.minimum(self.pressed, self.lowest))
 
     @property
     def surface(self) -> Array:
@@ -123,19 +128,21 @@ class CarvedCells:
 
     def press(self, pressed: Array) -> None:
         """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
-        before, after = (np.maximum(height - self.lowest, 0.0) for height in (self.pressed, pressed))
-        self.loose += np.maximum(after - before, 0.0)
+        before, raised = self.standing, pressed - self.pressed
         self.pressed = pressed
+        more = np.where(raised > 0, raised - (self.standing - before), 0.0)
+        self.cut_height += float(more.sum())
+        self.loose += more
 
     def cut(
         self, underside: Array, way: Array, packing: float, bodies: Array | None = None, *, again: float | None = None
-    ) -> None:
+    ) -> Array:
         """Cut the ground to a body's underside.
 
         Parameters
         ----------
-        underside : (rows, columns) float array
-            Lowest surface of the body over each cell [m], infinite where there is none.
+        underside : (4, rows, columns) float array
+            Lowest surface of the body over each quarter of a cell [m], infinite where there is none.
         way : (2,) float array
             Way of the body since the cut before, along x and y [m]: what is cut goes ahead of it.
         packing : float
@@ -144,26 +151,36 @@ class CarvedCells:
             Lowest surface of all bodies, if there are others: nothing is laid in them [m].
         again : float, optional
             Part of the loose matter that is packed, if not as much: what is pushed ahead is cut again at each frame.
+
+        Returns
+        -------
+        (rows, columns) float array of what was cut [m].
         """
-        standing = self.standing
+        standing = np.minimum(self.pressed, self.lowest)
         depth = standing + self.loose - underside
-        depth[self.closed | (depth < np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))] = 0.0
+        least = np.where(self.closed, np.inf, np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))
+        depth = np.where(depth >= least, depth, 0.0)
         if not depth.any():
-            return
-        of_loose = np.minimum(self.loose, depth)
-        of_standing = depth - of_loose
-        self.loose -= of_loose
-        self.lowest = np.where(of_standing > 0, standing - of_standing, self.lowest)
+            return depth[0]
+        before, beyond = self.standing, depth > self.loose
+        self.lowest = np.where(beyond, standing - (depth - self.loose), self.lowest)
+        of_standing, of_loose = before - self.standing, _middle(np.minimum(depth, self.loose))
+        depth = of_standing + of_loose
+        self.loose = np.maximum(self.loose - of_loose, 0.0)
         self.cut_height += float(of_standing.sum())
         thrown = (1.0 - packing) * of_standing + (1.0 - (packing if again is None else again)) * of_loose
         self.packed += float((depth - thrown).sum())
-        if not thrown.any():
-            return
+        if thrown.any():
+            self._lay(thrown, way, underside.min(axis=0) if bodies is None else bodies)
+        return depth
+
+    def _lay(self, thrown: Array, way: Array, bodies: Array) -> None:
+        """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
-        under_body = (underside if bodies is None else bodies) - self.surface - TOLERANCE
+        highest = bodies - self.standing - TOLERANCE
         remaining = float(thrown.sum())
-        for most in (np.minimum(under_body, THICKEST - self.loose), under_body):
-            room = np.maximum(most, 0.0)
+        for thickest in (THICKEST, HIGHEST, np.inf):
+            room = np.maximum(np.minimum(highest, thickest) - self.loose, 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
                 if remaining <= ROUNDING or not (total := share.sum()):
@@ -219,8 +236,18 @@ class CarvedCells:
         loose = self.loose + change
         fallen = loose < -ROUNDING
         self.cut_height -= float(loose[fallen].sum())
-        self.lowest[fallen] = (standing + loose)[fallen]
+        self.lowest[:, fallen] = (np.minimum(self.pressed, self.lowest) + loose)[:, fallen]
         self.loose = np.maximum(loose, 0.0)
+
+
+def _middle(quarters: Array) -> Array:
+    """Mean of the two in the middle of four values (4, rows, columns).
+
+    A quarter that stands out alone does not count: no wall fills a slot that is hardly wider than a cell.
+    """
+    a, b, c, d = quarters
+    low, high = np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray((low + high) / 2)
 
 
 def _around(thrown: Array, way: Array, cell_size: float) -> Array:

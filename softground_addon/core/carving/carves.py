@@ -24,10 +24,10 @@ from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
 from ..record.moved_carve import placement, shifted
 from ..record.record import BakeRecord, EditableStep
-from .carved_ground import CarvedGround
+from .carved_ground import CarvedGround, Part
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
-from .responded_skin import NO_SOLE, RespondedSkin, WornSkin
+from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
 
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
@@ -93,17 +93,17 @@ def carves_of(
     count : int
         Of the steps that bodies take; those of higher numbers are copies.
     """
-    first = next(iter(footprints.values()))
+    first, frames = next(iter(footprints.values())), skins[0][2].frames
+    deep = _deep(footprints, float(frames[0]), float(frames[-1]))
     steps = {
         number: CarvedStep(
             footprint,
-            is_deep(footprint),
+            number in deep,
             FootprintRecorder(first.cell_size, first.frame_step),
             _walls(footprint, ground, surface),
         )
         for number, footprint in footprints.items()
     }
-    frames = skins[0][2].frames
     carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
     bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
@@ -113,20 +113,30 @@ def carves_of(
         for body in bodies:
             yield
             around = next(body.poses)
-            low = carving.low(around)
-            for step, behind, triangles in body.parts(number):
-                if behind is not None:
-                    carving.leave(behind)
-                if step.is_deep and (part := carving.drawn(step, around, low, triangles)) is not None:
-                    drawn.append(part)
-        for part in drawn:
+            low, parts = carving.low(around), body.parts(number)
+            for behind in body.behind(number):
+                carving.leave(behind)
+            for walls in dict.fromkeys(part.step.walls for part in parts):
+                if (passed := carving.drawn(parts, around, low, walls)) is not None:
+                    drawn.append(passed)
+        for passed in drawn:
             yield
-            carving.carve(part, drawn, frame)
+            carving.carve(passed, drawn, frame)
         carving.settle(drawn, frame)
     for step in steps.values():
         yield
         carving.finish(step, float(frames[-1]))
     return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+
+
+def _deep(footprints: Mapping[int, Footprint], first: float, last: float) -> set[int]:
+    """Numbers of the deep prints; with those that an end of the shot cuts, of soles that leave deep ones."""
+    deep = {number for number, print in footprints.items() if is_deep(print)}
+    soles = {(footprints[number].character, footprints[number].sole) for number in deep}
+    cut = {
+        number for number, print in footprints.items() if print.start_frame < first + 1 or print.end_frame > last - 1
+    }
+    return deep | {number for number in cut if (footprints[number].character, footprints[number].sole) in soles}
 
 
 def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
@@ -149,17 +159,27 @@ class _Body:
         self.poses = _poses(skin)
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
-        for sole, triangles in skin.triangles.items():
-            taken = of_body if sole == NO_SOLE else [step for step in of_body if step.footprint.sole == soles[sole]]
+        places = skin.at(np.zeros(1, dtype=np.intp))[0]
+        every = list(skin.triangles.values())
+        outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
+        for (sole, triangles), sides in zip(skin.triangles.items(), outward, strict=True):
+            goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
+            taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             if taken:
-                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles))
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles, sides))
 
-    def parts(self, number: int) -> Iterator[tuple[CarvedStep, CarvedStep | None, Indices]]:
-        """The step that each part is nearest to at a frame, the one that its sole has just left, and triangles."""
-        for sole, taken, nearest, triangles in self._parts:
-            before = nearest[max(number - 1, 0)]
-            has_left = sole != NO_SOLE and before != nearest[number]
-            yield taken[nearest[number]], taken[before] if has_left else None, triangles
+    def parts(self, number: int) -> list[Part]:
+        """The step that each part is nearest to at a frame, with the part."""
+        return [Part(taken[nearest[number]], *skin) for _, taken, nearest, *skin in self._parts]
+
+    def behind(self, number: int) -> list[CarvedStep]:
+        """The steps that soles are not nearest to any more at a frame."""
+        before = max(number - 1, 0)
+        return [
+            taken[nearest[before]]
+            for sole, taken, nearest, *_ in self._parts
+            if sole != NO_SOLE and nearest[before] != nearest[number]
+        ]
 
 
 def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from ..legs.grounding import Response, leg_soles
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Array, Indices
+from ..numerics.components import components
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
 from ..rig.recording import Recording
 from ..rig.rig_skin import RigSkin, carried, skinned
+from ..skin.volume import welded
 
 NO_SOLE = -1
-"""In place of the sole of skin that belongs to several, as a trunk does."""
+"""In place of the sole of skin that belongs to several, as a trunk does, or to none."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class RespondedSkin:
     jumps : tuple of int
         Samples at which the body is elsewhere than before, as at a cut.
     triangles : mapping of int to (T, 3) int array
-        By the number of the sole that they go with, or `NO_SOLE`; without what is carried.
+        By the number of the sole that they go with, or `NO_SOLE`, as of what is carried or dragged.
     """
 
     def __init__(self, worn: WornSkin, motion: CharacterMotion, response: Response) -> None:
@@ -88,15 +90,37 @@ class RespondedSkin:
         self.jumps = tuple(motion.starts[1:].tolist())
         recorded = vars(worn.recording)
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
-        body = ~carried(worn.skin, worn.bones)[worn.skin.triangles].any(axis=1)
-        sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[worn.skin.triangles[:, 0]]]
-        self.triangles = {int(number): worn.skin.triangles[body & (sole == number)] for number in np.unique(sole[body])}
+        triangles = worn.skin.triangles
+        sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[triangles[:, 0]]]
+        sole[carried(worn.skin, worn.bones)[triangles].any(axis=1)] = NO_SOLE
+        self.triangles = {int(number): triangles[sole == number] for number in np.unique(sole)}
 
     def at(self, samples: Indices) -> Array:
         """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""
         count = len(self._worn.skin.vertices)
         recording = self._recording.of(samples)
         return skinned(self._worn.skin, self._worn.bones, recording, np.arange(count)).astype(float)
+
+
+def outsides(points: Array, triangles: Indices) -> Array:
+    """Sides of triangles (T, 3) that are outside: 1 where their normals point out of a closed piece, -1 where into it.
+
+    Of open pieces, 0: no side of theirs is known to be outside.
+
+    Examples
+    --------
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> outsides(corners, faces), outsides(corners, faces[:, ::-1]), outsides(corners, faces[:3])
+    (array([1., 1., 1., 1.]), array([-1., -1., -1., -1.]), array([0., 0., 0.]))
+    """
+    corners, count = welded(points)[triangles], len(points)
+    start, end = np.concatenate([corners[:, [k, (k + 1) % 3]] for k in range(3)]).T
+    piece = components(count, start, end)[corners[:, 0]]
+    is_lone = ~np.isin(start * count + end, end * count + start)
+    volume = np.bincount(piece, np.linalg.det(points[triangles] - points.mean(axis=0)))
+    is_open = np.bincount(np.tile(piece, 3), is_lone) > 0
+    return np.asarray(np.where(is_open, 0.0, np.sign(volume))[piece])
 
 
 def _parts_of_bones(worn: WornSkin, motion: CharacterMotion, response: Response) -> dict[str, Array]:

@@ -9,13 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..ground.display_blur import gaussian_kernel
+from ..ground.heightfield import HeightField
 from ..ground.places import Places
 from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
-from .print_relief import relief_of_print
+from .carved_lumps import lumps, lying
+from .print_relief import FINEST_CRUMB, relief_of_print
 from .tread import SoleTread
 
 QUANTUM = 2.0**-20
@@ -96,10 +98,15 @@ def relief_of_steps(
     """
     places = Places(x, y)
     standing, water = np.zeros((len(places.x), 2)), np.zeros(len(places.x))
+    loose, lumped = lying(footprints) if len(places.x) else None, np.zeros(len(places.x))
     steps = []
     for footprint in footprints:
         yield
-        steps.append(_step(footprint, places, standing, water, wanted, blur_sigma).scaled(wanted.strength))
+        if loose and not len(footprint.contact_cells):
+            step = _carve(footprint, loose, places, lumped, water, wanted)
+        else:
+            step = _step(footprint, places, standing, water, wanted, blur_sigma)
+        steps.append(step.scaled(wanted.strength))
     return steps
 
 
@@ -138,6 +145,23 @@ def _step(
     water[point] = np.maximum(water[point] * (1.0 - relief.pressed), relief.water)
     changed = change.any(axis=1)
     return StepRelief(point[changed], change[changed], water[point[changed]], of_print.has_tread)
+
+
+def _carve(
+    carve: Footprint, loose: HeightField, places: Places, lumped: Array, water: Array, wanted: ReliefSettings
+) -> StepRelief:
+    """Lumps of full strength in what a body carved; updates those (K,) at all places."""
+    point = places.within(carve.window, carve.cell_size)
+    if not len(point):
+        return NOTHING
+    amounts = wanted.of_surfaces.get(carve.surface, wanted.amounts)
+    smallest = FINEST_CRUMB * _finest(places, point, carve.cell_size)
+    height = lumps(carve, loose, places.x[point], places.y[point], amounts, smallest)
+    height = np.round(height / QUANTUM) * QUANTUM
+    change = np.where(height, height - lumped[point], 0.0)
+    lumped[point] += change
+    point, change = point[change != 0], change[change != 0]
+    return StepRelief(point, np.stack([change, np.zeros(len(point))], axis=-1), water[point])
 
 
 def _finest(places: Places, point: Indices, cell_size: float) -> float:

@@ -5,7 +5,14 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
+from sample_scenes.body import Body
+from sample_scenes.character import create_character
+from sample_scenes.dog import Dog
+from sample_scenes.four_legged import WALK, go_on_four_legs
+from sample_scenes.keys import write_action
+from sample_scenes.run import Run, run
 from softground_addon.blender import ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
@@ -19,7 +26,8 @@ from softground_addon.core.pressing.repose import NEIGHBOURS
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
-from tests.blender import shots
+from tests.blender import rigs, shots
+from tests.blender.characters import test_crawling
 from tests.blender.grounds import field
 
 FRAMES = 44
@@ -92,6 +100,79 @@ def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_a
     ]
     print(f"\nskin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
     assert max(depths) <= CELL
+
+
+def runner(scene):
+    body = Body()
+    armature = create_character("Runner", body, scene.collection, shots.COARSE)
+    write_action(armature, run(body, Run(), FRAMES, 24), "Run")
+    return armature
+
+
+def dog(scene):
+    body = Dog()
+    armature = create_character("Dog", body, scene.collection)
+    write_action(armature, go_on_four_legs(body, WALK, FRAMES, 24), "Walk")
+    return armature
+
+
+def crawler(scene):
+    scene.render.fps = test_crawling.RATE
+    return test_crawling.crawler(rigs.FAMILIES["mixamo"])
+
+
+@pytest.mark.parametrize(
+    ("mover", "snow"),
+    [
+        pytest.param(runner, {**DEEP, "youngs_modulus": 300e3}, marks=pytest.mark.slow),
+        (dog, {**DEEP, "youngs_modulus": 200e3}),
+        pytest.param(crawler, {**DEEP, "youngs_modulus": 60e3}, marks=pytest.mark.slow),
+    ],
+)
+def test_nor_of_who_runs_crawls_or_goes_on_four_legs(scene, skins, mover, snow):
+    scene.render.fps, scene.render.fps_base = 24, 1.0
+    armature = mover(scene)
+    shots.coarse(scene)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.frame_end, options.sink_feet, options.pressure = FRAMES, True, "CENTRE_OF_PRESSURE"
+    for name, value in snow.items():
+        setattr(options.material, name, value)
+    report, record_of_bake = bake(scene)
+    (skin,) = skins
+    depths = [
+        in_the_ground(record_of_bake.shaping, places, frame).max()
+        for frame, places in zip(skin.frames, skin.at(np.arange(len(skin.frames))), strict=True)
+    ]
+    deepest = max(step.max_depth_m for step in record_of_bake.footprints)
+    print(f"\ndeepest {deepest:.3f} m, skin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
+    assert report["carved"]
+    assert max(depths) <= CELL
+
+
+def test_what_a_body_drags_carves_the_snow(scene):
+    armature = walker(scene, **DEEP)
+    scene.frame_set(1)
+    mesh = bpy.data.meshes.new("Sledge")
+    corners = np.array(np.meshgrid((-0.2, 0.2), (-0.2, 0.2), (0.0, 0.4))).reshape(3, -1).T
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh.from_pydata(corners.tolist(), [], faces)
+    sledge = bpy.data.objects.new("Sledge", mesh)
+    scene.collection.objects.link(sledge)
+    sledge.parent, sledge.parent_type, sledge.parent_bone = armature, "BONE", "spine"
+    bpy.context.view_layer.update()
+    behind = armature.matrix_world @ armature.pose.bones["hips"].matrix.translation
+    sledge.matrix_world = Matrix.Translation((behind.x + 0.6, behind.y, 0.2))  # aside, 10 cm deep as feet sink
+    bpy.context.view_layer.update()
+    _, record_of_bake = bake(scene)
+    scene.frame_set(FRAMES // 2)
+    shown = sledge.matrix_world.translation
+    assert -0.25 < shown.z < -0.05
+    compression, rim = recompose(record_of_bake.shaping, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    assert (rim - compression)[0] < shown.z + 0.02
+    without = recompose(record_of_bake.edited, FRAMES // 2).nearest(np.array([shown.x]), np.array([shown.y]))
+    assert without[1][0] - without[0][0] > -0.01
 
 
 def test_between_two_holes_the_ground_is_5_cm_lower_than_the_snow(scene):
@@ -167,6 +248,10 @@ def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
     window = Window(int(column), int(row), int(columns), int(rows))
     compression, rim = field.read(window)
     places = np.stack(np.meshgrid(*window.centres(CELL)), axis=-1)
+    lying = sum(carve.tile(carve.rim).sum() for carve in record_of_bake.carves.values()) * CELL**2
+    volumes = report["carved"][armature.name]
+    assert lying == pytest.approx(volumes["loose_m3"], rel=1e-6)
+    assert volumes["cut_m3"] == pytest.approx(sum(volumes.values()) - volumes["cut_m3"], rel=1e-9)
     lasts = [step.position[:2] for step in record_of_bake.footprints[-2:]]
     at_rest = np.min([np.linalg.norm(places - last, axis=-1) for last in lasts], axis=0) > 0.7
     for first, other, way in NEIGHBOURS:

@@ -22,13 +22,13 @@ def walls_of(surface, angle=None):
 
 def level(rows=60, columns=60):
     nothing, flat = np.zeros((rows, columns), bool), np.zeros((rows, columns))
-    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full(flat.shape, np.inf), flat.copy())
+    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full((4, *flat.shape), np.inf), flat.copy())
 
 
 def block(cells, low, high, bottom):
     """The underside of an upright block between two corners (row, column)."""
-    underside = np.full(cells.loose.shape, np.inf)
-    underside[low[0] : high[0], low[1] : high[1]] = bottom
+    underside = np.full((4, *cells.loose.shape), np.inf)
+    underside[:, low[0] : high[0], low[1] : high[1]] = bottom
     return underside
 
 
@@ -59,6 +59,16 @@ def test_what_is_cut_goes_ahead_of_the_body():
     middle_row, middle_column = ((cells.loose * index).sum() / cells.loose.sum() for index in (rows, columns))
     assert middle_row == pytest.approx(29.5, abs=0.05)
     assert middle_column > 31.0
+
+
+def test_nothing_is_laid_higher_than_what_hovers_over_it():
+    cells = level()
+    over = block(cells, (0, 0), (60, 60), 0.05)
+    cells.cut(
+        block(cells, (10, 10), (50, 50), -0.5), NOBODY, 0.0, np.minimum(over, block(cells, (10, 10), (50, 50), -0.5))[0]
+    )
+    assert cells.unplaced > 0
+    assert cells.surface.max() <= 0.05
 
 
 def test_thin_layers_are_gathered_and_nothing_of_them_is_lost():
@@ -157,6 +167,17 @@ def test_the_rim_of_a_later_print_rises_on_carved_ground():
     rim[18:32, 18:32] = 0.01
     cells.press(cells.pressed + rim)
     assert cells.surface.sum() == pytest.approx(volume + rim.sum(), rel=1e-12)
+    assert cells.cut_height == pytest.approx(cells.packed + cells.loose.sum(), rel=1e-12), "what rose there is loose"
+
+
+def test_a_cell_is_cut_by_the_share_that_is_covered_and_no_further_when_that_passes_again():
+    cells = level()
+    underside = block(cells, (20, 20), (30, 30), -0.2)
+    underside[:2, 29] = np.inf
+    for _ in range(3):
+        cells.cut(underside, NOBODY, 1.0)
+    assert cells.cut_height == pytest.approx((90 + 10 * 0.5) * 0.2, rel=1e-12)
+    assert cells.surface[29, 20:30] == pytest.approx(-0.1, abs=1e-12)
 
 
 def test_a_wall_is_as_high_as_a_vertical_cut_may_be():
