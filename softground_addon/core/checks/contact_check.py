@@ -26,7 +26,7 @@ SLOWEST = 2.0
 SHORTEST = 0.04
 """Time over which skin is seen to move [s]."""
 RESTS = 0.25
-"""Skin of no contact that rests as long wants a print within reach [s]."""
+"""Skin that rests as long wants a print within reach, also where it is of no contact, or others touch [s]."""
 TOGETHER = 0.5
 """Share of the rarer one's time for which two contacts of one foot both touch, and of their breadth within which."""
 
@@ -58,7 +58,8 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         yield
         of_sole, on = owner == number, touching[:, number]
         name = motion.soles[number].sole.name
-        absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, longest)
+        bears = np.where(touching.any(axis=1), max(RESTS * slow, LEAST_FRAMES), longest)  # or it brushes the ground
+        absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
     for part in np.flatnonzero((owner < 0) & rests.any(axis=0)):
         yield
@@ -75,11 +76,23 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     return findings
 
 
-def _first(name: str, state: Mask, longest: float) -> dict[str, int]:
-    """The first step of a state that lasts for more than `longest` steps, by a name; feet that tremble interrupt it."""
-    start, end = runs(close_short(state, int(longest / 2) + 1))
-    lasts = np.flatnonzero(end - start > longest)
-    return {name: int(start[lasts[0]])} if len(lasts) else {}
+def _first(name: str, state: Mask, longest: Array | float) -> dict[str, int]:
+    """The first step of a state that lasts for more than `longest` steps, by a name; feet that tremble interrupt it.
+
+    `longest` (F,) may differ: the least within a state counts.
+    """
+    least = np.broadcast_to(longest, state.shape)
+    start, end = runs(close_short(state, int(least.min() / 2) + 1))
+    lasts = [first for first, last in zip(start, end, strict=True) if last - first > least[first:last].min()]
+    return {name: int(lasts[0])} if lasts else {}
+
+
+def _borders(on: Mask) -> Mask:
+    """True beside a contact, (F,)."""
+    borders = np.zeros_like(on)
+    borders[1:] |= on[:-1]
+    borders[:-1] |= on[1:]
+    return borders
 
 
 def _still(skin: LowSkin, rests: Mask, rate: float) -> Mask:
