@@ -103,12 +103,21 @@ def untouched(options: Any) -> list[tuple[Any, str]]:
     return [(group, field) for group, field in fields if not group.is_property_set(field)]
 
 
-def _of_preset(options: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
-    """Contents of a preset: groups of settings, names in them, values."""
-    material = options.material
+def make_of(options: Any, material: Any, preset: Preset) -> None:
+    """Set the material of one of the scene's grounds to a preset's."""
+    for group, field, value in _of_material(options, material, preset):
+        setattr(group, field, value)
+
+
+def _of_material(options: Any, material: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
     scale = {field: typed(options.length_scale) for field in LENGTHS}
     said = [(material, field, getattr(preset.material, field) * scale.get(field, 1.0)) for field in MATERIAL_FIELDS]
-    said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
+    return [*said, (material, "preset", preset.name), (material, "surface", preset.surface)]
+
+
+def _of_preset(options: Any, preset: Preset) -> list[tuple[Any, str, Any]]:
+    """Contents of a preset: groups of settings, names in them, values."""
+    said = _of_material(options, options.material, preset)
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
     said += [(options, "debris", preset.debris)]
     return [entry for entry in said if entry[2] is not None]

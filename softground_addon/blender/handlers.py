@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import reuse, session, translation, tread_images
+from . import reuse, session, settings, translation, tread_images
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -48,9 +48,9 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
-        _follow_deletion(scene.softground.ground)
+        _follow_deletion(scene)
         if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
-            _follow_weather_keys(scene.softground.ground)
+            _follow_weather_keys(scene)
             for copy in [update.id.original for update in depsgraph.updates if update.is_updated_geometry]:
                 if isinstance(copy, bpy.types.Object):
                     weather_keys.follow(copy)
@@ -66,15 +66,15 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         _later(compare_prediction)
 
 
-def _follow_deletion(ground: bpy.types.Object | None) -> None:
-    if ground is not None and not live.is_on():
+def _follow_deletion(scene: Any) -> None:
+    for ground in settings.listed_grounds(scene.softground) if not live.is_on() else ():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
             belongs.follow(ground, is_deleted=is_deleted)
 
 
-def _follow_weather_keys(ground: bpy.types.Object | None) -> None:
-    if ground is not None:
+def _follow_weather_keys(scene: Any) -> None:
+    for ground in settings.listed_grounds(scene.softground):
         weather_keys.follow(baked_ground.display_mesh_of(ground))
 
 
@@ -99,7 +99,7 @@ def begin_render(scene: Any = None, *_: Any) -> None:
     """Live mode stands still during renders, and weather has all keys."""
     live.rendering(True)
     if scene is not None:
-        _follow_weather_keys(scene.softground.ground)
+        _follow_weather_keys(scene)
 
 
 @persistent
@@ -121,8 +121,8 @@ def after_undo(*_: Any) -> None:
     tread_images.forget()
     analysis.look_again()
     live.after_undo()
-    _follow_deletion(bpy.context.scene.softground.ground)
-    _follow_weather_keys(bpy.context.scene.softground.ground)
+    _follow_deletion(bpy.context.scene)
+    _follow_weather_keys(bpy.context.scene)
 
 
 @persistent

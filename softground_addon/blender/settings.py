@@ -16,7 +16,7 @@ from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.rig.mapping import SoleSource
 from ..core.rig.recording import SceneUnits
-from ..core.settings import DOWN, BakeSettings, CharacterSettings, ObjectName, ResponseOptions
+from ..core.settings import DOWN, BakeSettings, CharacterSettings, GroundSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
 from . import ground_slots, tread_images
@@ -58,8 +58,42 @@ def exists(obj: bpy.types.Object | None) -> bool:
 
 def hard_grounds_of(options: Any) -> list[bpy.types.Object]:
     """The hard objects of the settings that are there, each once."""
-    listed = dict.fromkeys(item.object for item in options.hard_grounds)
-    return [obj for obj in listed if exists(obj) and obj != options.ground]
+    listed, soft = dict.fromkeys(item.object for item in options.hard_grounds), grounds_of(options)
+    return [obj for obj in listed if exists(obj) and obj not in soft]
+
+
+def listed_grounds(options: Any) -> list[bpy.types.Object]:
+    """The soft grounds of the settings, each once, deleted or not."""
+    return [*filter(None, dict.fromkeys([options.ground, *(item.object for item in options.grounds)]))]
+
+
+def grounds_of(options: Any) -> list[bpy.types.Object]:
+    """The soft grounds of the settings that are there, each once; none without the first."""
+    return list(filter(exists, listed_grounds(options))) if exists(options.ground) else []
+
+
+def _further_grounds(options: Any, units: SceneUnits) -> tuple[GroundSettings, ...]:
+    """The soft grounds beside the first; what no preset was chosen for is made of what the first is made of."""
+    items = {item.object: item for item in reversed(options.grounds)}
+    return tuple(
+        GroundSettings(ground=name_of(obj), **_set_for(options, units, obj, items[obj]))
+        for obj in grounds_of(options)[1:]
+    )
+
+
+def _set_for(options: Any, units: SceneUnits, ground: bpy.types.Object | None, group: Any) -> dict[str, Any]:
+    """Values of a ground, which a group of settings has for it, as `GroundSettings` and `BakeSettings` call them."""
+    material = group.material if group.material.is_property_set("preset") else options.material
+    painted = group.painted
+    return {
+        "preset": material.preset,
+        "surface": material.surface,
+        "material": _material(material),
+        "painted": (painted.stiffness, painted.layer_depth, painted.rim),
+        "weather": _calm(options, material.surface, units) if options.steps_feel_weather else None,
+        "regions": ground_slots.regions_of(ground, typed(options.length_scale)) if ground else (),
+        "under": group.under,
+    }
 
 
 def _wet_grounds(options: Any) -> tuple[str, ...]:
@@ -70,9 +104,12 @@ def _wet_grounds(options: Any) -> tuple[str, ...]:
 
 
 def forget_deleted_ground(options: Any) -> None:
-    """Take a ground that was deleted out of the settings."""
+    """Take grounds that were deleted out of the settings."""
     if options.ground is not None and not exists(options.ground):
         options.ground = None
+    for number in reversed(range(len(options.grounds))):
+        if not exists(options.grounds[number].object):
+            options.grounds.remove(number)
 
 
 def typed(value: float) -> float:
@@ -82,7 +119,10 @@ def typed(value: float) -> float:
 
 def material_of(options: Any) -> GroundMaterial:
     """The scene's ground material as the core's type."""
-    values = options.material
+    return _material(options.material)
+
+
+def _material(values: Any) -> GroundMaterial:
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 
@@ -157,19 +197,16 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     """
     options = scene.softground
     frames, has_ground = (options.frame_start, options.frame_end), exists(options.ground)
+    units = units_of(scene)
     return BakeSettings(
         file=bpy.data.filepath,
         scene=scene.name,
         ground=name_of(options.ground) if has_ground else None,
         characters=tuple(character_of(entry) for entry in options.characters if is_set_up(entry)),
-        preset=options.material.preset,
-        surface=options.material.surface,
-        material=material_of(options),
         pressure=options.pressure,
-        painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         cell_size_m=typed(options.cell_size),
         frames=frames,
-        **vars(units_of(scene)),
+        **vars(units),
         response=_response(options, grounded=grounded),
         sink_feet=options.sink_feet,
         carve=options.carve,
@@ -188,24 +225,23 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         keep_forces=options.keep_forces,
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
-        weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
         camera=None if has_ground else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,
         carried=(typed(options.carried_amount), typed(options.carried_reach)),
-        under=options.under,
-        regions=ground_slots.regions_of(options.ground, typed(options.length_scale)) if has_ground else (),
         gravity_direction=gravity_direction_of(scene),
+        **_set_for(options, units, options.ground if has_ground else None, options),
+        grounds=_further_grounds(options, units),
     )
 
 
-def _calm(options: Any, units: SceneUnits) -> FeltWeather:
+def _calm(options: Any, surface: str, units: SceneUnits) -> FeltWeather:
     """No weather, for steps that would feel it."""
     stretch = units.time_stretch
     span = span_of(options.frame_start * stretch, options.frame_end * stretch)
     first, last = span.first / stretch, span.last / stretch
-    return FeltWeather(surface=options.material.surface, first=first, last=last, frame_rate=units.frame_rate)
+    return FeltWeather(surface=surface, first=first, last=last, frame_rate=units.frame_rate)
 
 
 def is_prop(character: Any) -> bool:

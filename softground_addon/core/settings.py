@@ -8,7 +8,7 @@ thought, everything depends.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -17,6 +17,7 @@ from .ground.material import UNSAID, GroundMaterial, Pressure
 from .ground.regions import GroundKind, numbered
 from .loads.cell_limits import Fineness
 from .loads.estimate import ForceModel
+from .motion.ground_frame import rows
 from .response.foot_holds import FootHold
 from .response.response import GroundingOptions, TiltOptions
 from .rig.mapping import SoleSource
@@ -116,6 +117,20 @@ class RegionSettings:
 
 
 @dataclass(frozen=True)
+class GroundSettings:
+    """A soft ground beside the first, with what is set for it; the fields as of `BakeSettings`."""
+
+    ground: ObjectName
+    preset: str = field(metadata=_on(Acts.PRESSING))
+    surface: str = field(metadata=_on(Acts.OUTPUT))
+    material: GroundMaterial = field(metadata=_on(Acts.PRESSING))
+    painted: tuple[str, str, str]
+    weather: FeltWeather | None = field(metadata=_on(Acts.PRESSING))
+    regions: tuple[RegionSettings, ...]
+    under: str = field(metadata=_on(Acts.WRITING))
+
+
+@dataclass(frozen=True)
 class ResponseOptions:
     """Responses that are asked of the characters; None where something is off."""
 
@@ -185,6 +200,8 @@ class BakeSettings(SceneUnits):
         Unit vector in the world.
     under : 'AUTO', 'ALWAYS' or 'NEVER'
         True if prints show what lies below the layer; by default where that is thin.
+    grounds : tuple of GroundSettings
+        Soft grounds beside the first.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -226,6 +243,31 @@ class BakeSettings(SceneUnits):
     regions: tuple[RegionSettings, ...] = field(default=(), metadata=UNSAID)
     gravity_direction: tuple[float, float, float] = field(default=DOWN, metadata=UNSAID)
     under: str = field(default="AUTO", metadata={**UNSAID, **_on(Acts.WRITING)})
+    grounds: tuple[GroundSettings, ...] = field(default=(), metadata=UNSAID)
+
+    @property
+    def soft_grounds(self) -> list[ObjectName]:
+        """All soft grounds; none where one is to be made."""
+        return [self.ground, *(further.ground for further in self.grounds)] if self.ground else []
+
+    @property
+    def of_each_ground(self) -> tuple[BakeSettings, ...]:
+        """The settings as each ground has them: these, and after them with each of `grounds` as the first."""
+        return self, *(self._with_first(number) for number in range(len(self.grounds)))
+
+    def _with_first(self, number: int) -> BakeSettings:
+        first, names = self.grounds[number], [each.name for each in fields(GroundSettings)]
+        before = GroundSettings(**{name: getattr(self, name) for name in names})
+        frame = self.frame
+        if frame is not None and frame.moves:
+            frame = replace(frame, matrix=rows(frame.riding[first.ground.name]))
+        return replace(
+            self,
+            **{name: getattr(first, name) for name in names},
+            grounds=(*self.grounds[:number], before, *self.grounds[number + 1 :]),
+            relief_look=first.surface if self.relief_look else "",
+            frame=frame,
+        )
 
     @property
     def spacing_m(self) -> float:

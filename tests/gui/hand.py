@@ -98,11 +98,11 @@ class Hand:
     def picture(self, name: str, *, of: str = "", in_docs: bool = True) -> Steps:
         """Keep what the window shows, or one region of the viewport."""
         yield 0.5
-        crop = []
+        place = f"{self.window.width}x{self.window.height}+0+0"
         if of:
             region = self.region(of)
             place = f"{region.width}x{region.height}+{region.x}+{region.y}"
-            crop = ["-gravity", "SouthWest", "-crop", place, "+repage"]
+        crop = ["-gravity", "SouthWest", "-crop", place, "+repage"]
         folder = self.pictures / "docs" if in_docs else self.pictures
         folder.mkdir(exist_ok=True)
         subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=True)

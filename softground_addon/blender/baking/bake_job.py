@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import bpy
 import numpy as np
@@ -21,7 +22,6 @@ from ...core.composers.pressed_shot import edit_findings
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
-from ...core.events.events import as_edited
 from ...core.files import report
 from ...core.findings import Finding
 from ...core.meshing.refinement import refine
@@ -32,22 +32,22 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.record.record import BakeRecord
 from ...core.settings import Acts, BakeSettings
-from .. import settings
+from .. import jobs, settings
 from ..carried import marks_object
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
-from ..reading.shots import Shot, ground_of, read_shot, settings_of
+from ..reading.shots import Shot, read_shot, settings_of
 from ..remedies import worded
 from ..response import response_job
 from ..weather import ground_weather as weather
 from . import bake_report, step_soles
 from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
-from .publish import Published, at_the_end, publish, sign
+from .publish import Published, at_the_end, publish, sign, until_ready
 from .scene_findings import scene_findings
-from .shot_prints import shot_prints
+from .shot_prints import GroundPrints, shot_prints
 
 
 @dataclass(frozen=True)
@@ -95,58 +95,59 @@ def bake(
     wanted, refused = response_job.without_sinking(scene.view_layers[0], asked)
     started = time.perf_counter()
     shot, said = yield from _read(scene, wanted, write=write)
-    surface, factors = shot.surface, shot.surface.factors if shot.surface else None
+    surfaces = [part.surface for part in shot.of_each_ground if part.surface]
     edits = step_soles.edits_with_soles(scene.objects, wanted, edits)
-    movers = staleness.of_movers(scene.objects, wanted) | staleness.of_soles(scene.objects, mesh_soles(edits))
-    ground = ground_of(wanted, shot)
+    soles = staleness.of_soles(scene.objects, mesh_soles(edits))
+    movers = [staleness.of_movers(scene.objects, each) | soles for each in wanted.of_each_ground]
+    vertices = [surface.vertices for surface in surfaces]
     shot_hash = yield from meanwhile(
-        Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
+        Progress("sample", 1.0),
+        report.hash_inputs.slices(shot.motions, vertices if len(vertices) > 1 else next(iter(vertices), None)),
     )
     sampled = time.perf_counter()
 
     wanted = with_shoe_treads(wanted, shot.motions)
     frames = wanted.frames[1] - wanted.frames[0] + 1
-    prints = yield from shot_prints(wanted, shot, ground, edits)
-    record, debris, marks, happened = prints.record, prints.debris, prints.marks, prints.happened
-    footprints = record.footprints  # with all of their rims
+    prints = yield from shot_prints(wanted, shot, edits)
+    footprints = [step for each in prints.grounds for step in each.record.footprints]  # with all of their rims
     simulated = time.perf_counter()
 
-    inputs = wanted.inputs()
-    if factors is not None:
-        inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
-    if surface and surface.kinds is not None:
-        inputs["regions_crc32"] = f"{zlib.crc32(surface.kinds.tobytes()):08x}"
-    painted = inputs.get("painted_crc32", "") + inputs.get("regions_crc32", "")
+    of_grounds = [_inputs(each, part) for each, part in zip(wanted.of_each_ground, shot.of_each_ground, strict=True)]
+    painted = "".join(each.get("painted_crc32", "") + each.get("regions_crc32", "") for each in of_grounds)
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), painted, shot_hash)
-    findings = [*prints.findings, *said, *edit_findings(record), *response_job.keyed_responses(wanted)]
+    findings = [*prints.findings, *said, *response_job.keyed_responses(wanted)]
+    findings += [finding for each in prints.grounds for finding in edit_findings(each.record)]
     of_responses = response_findings(prints.responses)
-    rows = as_edited(happened, record.steps, record.laid_carves)
     build_report = partial(
         report.build,
-        inputs=inputs,
+        inputs=of_grounds[0],
         input_hash=input_hash,
-        steps=record.steps,
-        carves=record.laid_carves,
-        edits=record.edits,
+        steps=prints.steps,
+        carves=[carve for each in prints.grounds for carve in each.record.laid_carves.values()],
+        edits={name: edit for each in prints.grounds for name, edit in each.record.edits.items()},
         **prints.reported,
         worst_gaps=worst_gaps(prints.responses),
         suggested_speed=suggested_speeds(shot.motions, footprints),
-        events=marks.floors.with_films(rows, record.steps) if marks else rows,
-        carried_kg=vars(marks.carried) if marks else None,
+        events=prints.events,
+        carried_kg=vars(prints.carried) if prints.carried else None,
     )
+    steps = [step for step, _ in prints.steps]
     sole_length = shortest_sole(shot.motions)
     layers = (yield from response_job.layers_of(wanted, shot.rigs, prints.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del prints
-    published: Published | None = None
+    published: list[Published | None] = []
     if write and wanted.output != "RESPONSE":
-        about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        published, of_ground = yield from write_prints(
-            scene, wanted, shot, record.with_about(about), debris, sole_length
-        )
-        findings += of_ground
-        marks_object.put(published.ground, marks, surface=marks.floors.kind if marks else wanted.surface, units=wanted)
+        to_write = [
+            replace(
+                each,
+                record=each.record.with_about({"inputs": inputs, "input_hash": input_hash, EVENTS: each.happened}),
+            )
+            for each, inputs in zip(prints.grounds, of_grounds, strict=True)
+        ]
+        del prints
+        published, of_writing = yield from _write_all(scene, shot, to_write, sole_length)
+        findings += of_writing
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene.softground, wanted, layers)
     finished = time.perf_counter()
@@ -157,16 +158,61 @@ def bake(
             "write": finished - simulated,
             "frames_per_second": frames / (finished - started),
         },
-        playback_error_m=published.error if published else None,
+        playback_error_m=max((each.error for each in published if each), default=None),
         findings=worded([*findings, *of_responses, *refused]),
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):
         result[table] = baked_ground.events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
-    if published:
-        sign(published, asked, movers, summary=bake_report.summary(result), warnings=result["warnings"])
+    for each, made_with, moved in zip(published, asked.of_each_ground, movers, strict=False):
+        if each:
+            sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])
     yield Progress("write", 1.0)
-    return BakeResult(result, tuple(step.footprint or step.baked for step in record.steps if not step.is_copy))
+    return BakeResult(result, tuple(step.footprint or step.baked for step in steps if not step.is_copy))
+
+
+def _inputs(made_with: BakeSettings, shot: Shot) -> dict[str, Any]:
+    """The settings of a ground for the report, with checksums of what is painted on it and of its regions."""
+    inputs, surface = made_with.inputs(), shot.surface
+    if surface and surface.factors is not None:
+        inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
+    if surface and surface.kinds is not None:
+        inputs["regions_crc32"] = f"{zlib.crc32(surface.kinds.tobytes()):08x}"
+    return inputs
+
+
+def _write_all(
+    scene: bpy.types.Scene, shot: Shot, prints: list[GroundPrints], sole_length: float
+) -> Job[tuple[list[Published | None], list[Finding]]]:
+    """Put the prints on their grounds; what the scene shows is changed of all of them at once, in the last step.
+
+    Of several grounds, those without a print are as without a bake, and None is returned for them.
+    """
+    published: list[Published | None] = []
+    findings: list[Finding] = []
+    writing = [
+        write_prints(scene, each.made_with, part, each.record, each.debris, sole_length)
+        if each.record.footprints or len(prints) == 1
+        else None
+        for each, part in zip(prints, shot.of_each_ground, strict=True)
+    ]
+    marks = [(each.made_with, each.marks) for each in prints]
+    prints.clear()
+    if len(writing) > 1:
+        for waiting in filter(None, writing):
+            yield from until_ready(waiting)
+    for job, (made_with, its_marks) in zip(writing, marks, strict=True):
+        if job is None:  # no step is on it
+            assert made_with.ground
+            baked_ground.clear(settings.resolve(made_with.ground))
+            published.append(None)
+            continue
+        on_ground, of_ground = (yield from job) if len(writing) == 1 else jobs.run(job)
+        kind = its_marks.floors.kind if its_marks else made_with.surface
+        marks_object.put(on_ground.ground, its_marks, surface=kind, units=made_with)
+        published.append(on_ground)
+        findings += of_ground
+    return published, findings
 
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:

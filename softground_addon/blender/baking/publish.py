@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import bpy
 
@@ -57,6 +58,18 @@ def at_the_end(made_with: BakeSettings) -> dict[str, float]:
     }
 
 
+READY = Progress("write", 0.95)
+"""Progress of `publish` where all is worked out, and nothing in the scene was changed yet."""
+
+
+def until_ready(publishing: Job[Any]) -> Job[None]:
+    """Run the job of a ground up to where it is `READY`."""
+    for progress in publishing:
+        yield progress
+        if progress is READY:
+            return
+
+
 @sliced
 def with_debris(
     record: BakeRecord, ground: SoftGround, made_with: BakeSettings, loads: Sequence[CharacterLoads] | None = None
@@ -82,6 +95,8 @@ def marks_of_record(
     made_with: BakeSettings,
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
+    *,
+    brought: Mapping[str, float],
 ) -> Slices[Marks | None]:
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:
@@ -98,7 +113,7 @@ def marks_of_record(
             treads={} if is_bare else dict.fromkeys(feet, made_with.tread_m),
             bare=feet if is_bare else (),
             carried=made_with.carried,
-            brought={character.name: character.dirty_soles for character in made_with.characters},
+            brought=brought,
         )
     )
 
@@ -138,7 +153,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
         del lines, points  # they are large, and all is in the table
         yield Progress("write", 0.9)
         marks = _tread(footprints, place.position, made_with, relief)
-        yield Progress("write", 0.95)
+        yield READY
         yield from baked_ground.write(
             place,
             sample,

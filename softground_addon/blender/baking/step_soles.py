@@ -35,7 +35,7 @@ def names(objects: settings.Objects, ground: bpy.types.Object | None) -> list[st
 def edits_with_soles(
     objects: settings.Objects, wanted: BakeSettings, edits: Mapping[str, StepEdit] | None
 ) -> dict[str, StepEdit]:
-    """Edits for a bake, by default those on its ground, with the soles of the meshes that they name as these are now.
+    """Edits for a bake, by default those on its grounds, with the soles of the meshes that they name as these are now.
 
     Of a mesh that is gone, what the edits keep stays, or what those on the ground keep.
 
@@ -46,11 +46,12 @@ def edits_with_soles(
     """
     if edits == {}:
         return {}
-    ground = settings.resolve(wanted.ground) if wanted.ground else None
-    on_ground = baked_ground.edits_of(ground, [character.name for character in wanted.characters]) if ground else {}
+    grounds, names = list(map(settings.resolve, wanted.soft_grounds)), [each.name for each in wanted.characters]
+    on_ground = {name: edit for each in grounds for name, edit in baked_ground.edits_of(each, names).items()}
     edits = on_ground if edits is None else edits
     named = {edit.sole for edit in edits.values() if edit.sole}
-    here = {name: read(obj, ground, wanted.unit_scale_m) for name in sorted(named) if (obj := object_of(objects, name))}
+    first = next(iter(grounds), None)
+    here = {name: read(obj, first, wanted.unit_scale_m) for name in sorted(named) if (obj := object_of(objects, name))}
     return with_meshes(edits, mesh_soles(on_ground) | mesh_soles(edits) | here)
 
 

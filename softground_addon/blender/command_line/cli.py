@@ -22,7 +22,7 @@ from ...core.files import files, report
 from ...core.ground import presets
 from ...core.record.archive import LARGEST_TEXT
 from ...core.record.edits import StepEdit, from_json
-from .. import ground_presets, jobs, setting_paths, settings
+from .. import further_grounds, ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters.selection import set_up_automatically
 from ..output import export_formats
@@ -151,6 +151,7 @@ def _bake(options: argparse.Namespace) -> None:
     set_up_automatically(scene)
     if options.preset:
         ground_presets.apply_preset(scene.softground, _preset(options.preset))
+    _choose_grounds(scene, options.grounds)
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
     if options.cell_size is not None:
@@ -294,6 +295,23 @@ def _edits(path: Path) -> dict[str, StepEdit]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"The edits '{path}' are not valid JSON: {error}.") from None
     return from_json(content, f"The edits '{path}'")
+
+
+def _choose_grounds(scene: bpy.types.Scene, texts: Sequence[str]) -> None:
+    """Bake on the named meshes of a scene, `NAME` or `NAME=PRESET` each, in place of its own grounds."""
+    options, meshes = scene.softground, {obj.name: obj for obj in scene.objects if obj.type == "MESH"}
+    if texts:
+        options.grounds.clear()
+    for number, text in enumerate(texts):
+        name, preset = (text, "") if text in meshes else text.rpartition("=")[::2]
+        if name not in meshes:
+            raise InputError(f"--ground {text}: scene '{scene.name}' has no mesh '{name or text}'.")
+        if number == 0:
+            options.ground, material = meshes[name], options.material
+        else:
+            material = further_grounds.add(options, meshes[name]).material
+        if preset:
+            ground_presets.make_of(options, material, _preset(preset))
 
 
 def _preset(name_or_path: str) -> presets.Preset:

@@ -72,6 +72,10 @@ def _add_destination(parser: argparse.ArgumentParser) -> None:
 
 def _add_bake(bake: argparse.ArgumentParser) -> None:
     bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
+    bake.add_argument(
+        "--ground", dest="grounds", action="append", default=[], metavar="NAME[=PRESET]",
+        help="a mesh to bake on, in place of those of the file; may be repeated: each takes the steps on it",
+    )  # fmt: skip
     bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
     bake.add_argument(
         "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",

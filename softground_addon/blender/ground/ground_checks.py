@@ -38,25 +38,26 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
         )
 
 
-def hard_fault(obj: bpy.types.Object, ground: bpy.types.Object | None = None) -> str:
-    """Fault that prevents soles from standing on an object as hard ground, and the remedy; empty if there is none."""
+def hard_fault(obj: bpy.types.Object, ground: bpy.types.Object | None = None, where: str = "in Hard Ground") -> str:
+    """Fault that prevents soles from standing on an object beside the ground, and the remedy; empty if there is none.
+
+    `where` it is listed, for messages.
+    """
     name = obj.name
     if obj.type != "MESH":
-        return (
-            f"'{name}' in Hard Ground is not a mesh: convert it (Object > Convert > Mesh), or remove it from the list."
-        )
+        return f"'{name}' {where} is not a mesh: convert it (Object > Convert > Mesh), or remove it from the list."
     if obj.mode == "EDIT":
-        return f"'{name}' in Hard Ground is in Edit Mode: leave it with Tab first."
+        return f"'{name}' {where} is in Edit Mode: leave it with Tab first."
     mover, carrier = still_ground.mover_of(obj), still_ground.mover_of(ground) if ground else None
     if mover and mover != carrier:
-        return f"'{name}' in Hard Ground moves, as '{mover.name}' is animated: remove it from the list, or its keys."
+        return f"'{name}' {where} moves, as '{mover.name}' is animated: remove it from the list, or its keys."
     if carrier and mover is None:
         return (
-            f"'{name}' in Hard Ground stands still while '{carrier.name}' moves the ground: parent it to that, or "
+            f"'{name}' {where} stands still while '{carrier.name}' moves the ground: parent it to that, or "
             "remove it from the list."
         )
     if by := still_ground.changes_shape(obj):
-        return f"'{name}' in Hard Ground changes its shape by {by}: remove it from the list, or apply that."
+        return f"'{name}' {where} changes its shape by {by}: remove it from the list, or apply that."
     return ""
 
 

@@ -66,8 +66,13 @@ class GroundSurface:
 
 
 @sliced
-def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
-    """A ground's surface where it is not hard as a function of place, within bounds in the plane [m]."""
+def terrain_of(
+    surface: GroundSurface, bounds: Array | None = None, *, is_one_of_several: bool = False
+) -> Slices[MeshTerrain]:
+    """A ground's surface where it is not hard as a function of place, within bounds in the plane [m].
+
+    One of several may lie beside the bounds, where nobody walks: then it is looked up as a whole.
+    """
     triangles, kinds, name = surface.triangles, surface.kinds, f"Ground '{surface.name}'"
     is_soft = np.True_ if kinds is None else kinds != HARD
     if kinds is not None and not is_soft.all():
@@ -76,6 +81,8 @@ def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[Me
     try:
         return (yield from MeshTerrain.from_mesh.slices(*mesh, of_faces=kinds, name=name))
     except InputError:
+        if is_one_of_several:
+            return (yield from terrain_of.slices(surface))
         if is_soft.all():
             raise
     raise InputError(

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
+from ...core.errors import InputError
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
@@ -38,6 +39,8 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         If the scene could not be baked either.
     """
     wanted = settings_of(scene)
+    if wanted.grounds:
+        raise InputError("Live mode presses one ground: bake, or take the others out of the list in Ground.")
     known = yield from analysis.reading(scene)
     check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
     playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)

@@ -8,7 +8,7 @@ from bpy.props import FloatProperty
 
 from ...core.errors import InputError
 from ...core.meshing.cover import Cover, cover
-from .. import mesh_arrays, settings
+from .. import further_grounds, mesh_arrays, settings
 from ..drafts import none_left_if_it_fails
 from ..ground import created_ground, ground_checks, ground_surface
 from ..operator_base import reports_errors
@@ -61,17 +61,25 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
             laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
         except InputError as error:
             raise InputError(f"'{obj.name}' cannot be covered. {said(error)}") from None
+        first = options.ground if settings.exists(options.ground) and options.ground != obj else None
         with analysis.own_changes(scene):
             ground = _object_of(laid, f"{obj.name} Cover", units.unit_scale_m, thickness)
             ground.matrix_basis = to_world(units.frame, obj)
             created_ground.publish(scene, ground, options.material.surface)
-        options.material.layer_depth, options.under = thickness, "NEVER"  # there is no earth below
-        options.painted.property_unset("layer_depth")
+        for number in reversed(range(len(options.grounds))):
+            if options.grounds[number].object == obj:
+                options.grounds.remove(number)
+        text, material, group = "'{name}' is now the ground", options.material, options
+        if first:
+            options.ground, group, text = first, further_grounds.add(options, ground), "Soles print in {names} too"
+            material = further_grounds.own_material(options, group)
+        material.layer_depth, group.under = thickness, "NEVER"  # there is no earth below
+        group.painted.property_unset("layer_depth")
         if obj not in settings.hard_grounds_of(options):
             options.hard_grounds.add().object = obj
             options.active_hard_ground = len(options.hard_grounds) - 1
         created_ground.select(scene, ground)
-        self.report({"INFO"}, translated("'{name}' is now the ground", name=ground.name))
+        self.report({"INFO"}, translated(text, name=ground.name, names=repr(ground.name)))
         return {"FINISHED"}
 
 

@@ -32,7 +32,7 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
         if self.object:
             chosen = [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
-        taken = [options.ground, *settings.hard_grounds_of(options)]
+        taken = [*settings.grounds_of(options), *settings.hard_grounds_of(options)]
         chosen = [obj for obj in chosen if trail_detail.ground_of(obj) not in taken]
         if not chosen:
             raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")

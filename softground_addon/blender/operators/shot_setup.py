@@ -262,11 +262,17 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     bl_label = "Clear Bake"
     bl_options = {"REGISTER", "UNDO"}
 
+    only_shown: BoolProperty(
+        name="Only the Ground Shown",
+        description="Of several grounds, leave the others and the response as they are",
+        options={"SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = settings.scene_of(context)
-        ground = scene.softground.ground
-        if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene.softground):
+        grounds = settings.listed_grounds(scene.softground)
+        if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
         if session.current().is_live:
@@ -277,13 +283,15 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        ground = scene.softground.ground
+        grounds = settings.listed_grounds(scene.softground)
         reuse.forget()
         with analysis.own_changes(scene):
-            if ground is not None:
+            for ground in grounds[:1] if self.only_shown else grounds:
                 if baked_ground.has_remains(ground):
                     baked_ground.clear(ground)
                 look.take_off(ground)
+            if self.only_shown and grounds[1:]:
+                return {"FINISHED"}
             response_job.remove_layers(scene, LayerKind.RESPONSE)
         response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
         if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on

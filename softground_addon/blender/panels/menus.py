@@ -20,6 +20,7 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
         layout.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         layout.operator("softground.use_as_ground", icon="EYEDROPPER")
+        layout.operator("softground.add_ground", icon="ADD")
         layout.operator("softground.cover", icon="MOD_CLOTH")
         layout.separator()
         layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")

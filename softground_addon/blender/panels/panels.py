@@ -223,6 +223,15 @@ def _joint_label(joint: str) -> str:
     return f"{translated(name.capitalize())} {side.upper()}".rstrip()
 
 
+class SOFTGROUND_UL_grounds(Listed):
+    """Further grounds by name, each with a button that shows it in the panels."""
+
+    def draw_row(self, layout: Any, item: Any) -> None:
+        layout.prop(item, "object", text="", emboss=False, icon="MESH_GRID")
+        if item.object:
+            layout.operator("softground.choose_ground", text="", icon="EYEDROPPER").object = item.object.name
+
+
 class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
     """Ground that takes the prints"""
 
@@ -233,6 +242,8 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         options = scene.softground
         layout.prop(options, "ground", text="")
+        if options.grounds:
+            draw_list(layout, options, "grounds", "active_ground", "ground", rows=1, most=5)
         row = layout.row(align=True)
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")
@@ -373,6 +384,7 @@ CLASSES = (
     SOFTGROUND_UL_soles,
     SOFTGROUND_UL_joints,
     SOFTGROUND_PT_character,
+    SOFTGROUND_UL_grounds,
     SOFTGROUND_PT_ground,
     SOFTGROUND_PT_bake,
     SOFTGROUND_PT_of_character,

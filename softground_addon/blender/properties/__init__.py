@@ -13,7 +13,7 @@ from .character import (
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
-from .scene import DEFAULT_CELL_SIZE, SoftGroundHardGround, SoftGroundSettings
+from .scene import DEFAULT_CELL_SIZE, SoftGroundFurtherGround, SoftGroundHardGround, SoftGroundSettings
 
 CLASSES = (
     SoftGroundJoint,
@@ -26,6 +26,7 @@ CLASSES = (
     SoftGroundTilt,
     SoftGroundGrounding,
     SoftGroundHardGround,
+    SoftGroundFurtherGround,
     SoftGroundSettings,
     SoftGroundPreferences,
 )

@@ -74,12 +74,37 @@ class SoftGroundHardGround(bpy.types.PropertyGroup):
     )
 
 
+UNDER = EnumProperty(
+    name="Under-Layer",
+    description="When prints show what lies below the layer: earth under snow, wet sand under dry",
+    items=[
+        ("AUTO", "Where Thin", "Where the layer is up to 8 cm deep"),
+        ("ALWAYS", "Always", "Wherever feet press through most of the layer, however deep it is"),
+        ("NEVER", "Never", "Prints look like the layer all the way down"),
+    ],
+    default="AUTO",
+)
+
+
+class SoftGroundFurtherGround(bpy.types.PropertyGroup):
+    """A soft ground beside the first, and what is set for it."""
+
+    object: PointerProperty(
+        name="Object", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=is_mesh
+    )
+    material: PointerProperty(name="Material", type=SoftGroundMaterial)
+    painted: PointerProperty(name="Masks", type=SoftGroundPainted)
+    under: UNDER
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
     ground: PointerProperty(
         name="Ground", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=is_mesh
     )
+    grounds: CollectionProperty(name="Further Grounds", type=SoftGroundFurtherGround)
+    active_ground: IntProperty(name="Active Ground", options={"HIDDEN"})
     hard_grounds: CollectionProperty(name="Hard Ground", type=SoftGroundHardGround)
     active_hard_ground: IntProperty(name="Active Hard Ground", options={"HIDDEN"})
     characters: CollectionProperty(name="Characters", type=SoftGroundCharacter)
@@ -142,16 +167,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_max=20.0,
         precision=1,
     )
-    under: EnumProperty(
-        name="Under-Layer",
-        description="When prints show what lies below the layer: earth under snow, wet sand under dry",
-        items=[
-            ("AUTO", "Where Thin", "Where the layer is up to 8 cm deep"),
-            ("ALWAYS", "Always", "Wherever feet press through most of the layer, however deep it is"),
-            ("NEVER", "Never", "Prints look like the layer all the way down"),
-        ],
-        default="AUTO",
-    )
+    under: UNDER
     detail: EnumProperty(
         name="Detail",
         translation_context=CONTEXT,

@@ -63,7 +63,8 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
     units = replace(settings.units_of(scene), frame=GroundFrame(rows(np.linalg.inv(from_origin))))
-    matrices, *of_hard = jobs.run(_paths(scene, [ground, *map(settings.resolve, wanted.hard_grounds)], frames, units))
+    beside = [*wanted.hard_grounds, *wanted.soft_grounds[1:]]
+    matrices, *of_others = jobs.run(_paths(scene, [ground, *map(settings.resolve, beside)], frames, units))
     axes = axes_of(matrices)
     shape = np.swapaxes(axes, -1, -2) @ matrices[:, :3, :3]
     if np.ptp(shape, axis=0).max() > STIFF * np.abs(shape).max():
@@ -72,12 +73,13 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
             "parents, or choose a copy without them."
         )
     rounding = EVEN * np.spacing(np.abs(from_origin[:3, 3] + matrices[:, :3, 3]).max().astype(np.float32))
-    for hard, path in zip(wanted.hard_grounds, of_hard, strict=True):
-        beside = np.swapaxes(axes, -1, -2) @ (path - matrices)[:, :3]
-        if np.ptp(beside, axis=0).max() > STIFF * np.abs(beside).max() + rounding:
+    for other, path in zip(beside, of_others, strict=True):
+        apart = np.swapaxes(axes, -1, -2) @ (path - matrices)[:, :3]
+        if np.ptp(apart, axis=0).max() > STIFF * np.abs(apart).max() + rounding:
+            where = " in Hard Ground" if other in wanted.hard_grounds else ""
             raise InputError(
-                f"'{hard.name}' in Hard Ground does not move as ground '{name}' does: parent it to what that is "
-                "parented to, or remove it from the list."
+                f"'{other.name}'{where} does not move as ground '{name}' does: parent it to what that is parented to, "
+                "or remove it from the list."
             )
     matrices = from_origin @ matrices
     if not np.ptp(matrices, axis=0).any():

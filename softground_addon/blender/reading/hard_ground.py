@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.findings import Finding, listed
-from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.hard_ground import HardOnSoft, SeveralGrounds
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.raised_rests import RaisedRest, carried_by, raised_rests, reach_of
@@ -30,20 +30,31 @@ def with_hard_objects(
     scene: bpy.types.Scene,
     wanted: BakeSettings,
     motions: Sequence[CharacterMotion],
-    ground: Terrain,
+    grounds: Sequence[Terrain],
     bounds: Array,
     hard_parts: Sequence[MeshTerrain] = (),
-) -> Slices[tuple[Terrain, list[Finding]]]:
-    """A soft ground with the hard objects that soles stand on, and which of these are not in the settings.
+) -> Slices[tuple[Terrain, list[HardOnSoft], list[Finding]]]:
+    """Soft grounds with the hard objects that soles stand on.
 
     Parameters
     ----------
     bounds : (2, 2) float array
         Lower and upper corner of what is looked at [m].
     hard_parts : sequence of MeshTerrain
-        What of the ground itself is hard.
+        What of the grounds themselves is hard.
+
+    Returns
+    -------
+    terrain : Terrain
+        All of it.
+    apart : list of HardOnSoft
+        Each of several grounds, on which all others stand like hard objects; none of a single one.
+    findings : list of Finding
+        Objects that are not in the settings.
     """
     reach = reach_of(motions)
+    meshes = tuple(ground for ground in grounds if isinstance(ground, MeshTerrain))
+    ground = SeveralGrounds(meshes, reach) if len(grounds) > 1 else grounds[0]
     listed_tops = yield from _tops(wanted.hard_grounds, wanted, bounds)
     hard, wet = [*hard_parts, *(top for _, top in listed_tops)], dict[str, MeshTerrain]()
     liquids = dict(zip(wanted.hard_grounds, wanted.wet_grounds, strict=False))
@@ -58,7 +69,8 @@ def with_hard_objects(
     if carried:
         hard += [top for _, top, _ in carried]
         terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach, wet)
-    return terrain, [_finding(name.name, rests) for name, _, rests in carried]
+    apart = (yield from ground.apart.slices(ground, hard)) if isinstance(ground, SeveralGrounds) else []
+    return terrain, apart, [_finding(name.name, rests) for name, _, rests in carried]
 
 
 def _tops(
@@ -78,9 +90,9 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     """The meshes that a scene shows where soles rest, and that do not move."""
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
-    ground = settings.resolve(wanted.ground) if wanted.ground else None
+    grounds = [settings.resolve(name) for name in wanted.soft_grounds]
     known = {settings.resolve(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
-    known |= {ground, display_mesh_of(ground)} if ground else set()
+    known |= {*grounds, *map(display_mesh_of, grounds)}
     still = []
     for obj in scene.objects:
         if obj.type != "MESH" or obj in known or obj.hide_render or obj.display_type in ("WIRE", "BOUNDS"):
@@ -90,7 +102,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
         world = matrix_in(wanted.frame, obj) if wanted.frame else np.array(obj.matrix_world)
         box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
         inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
-        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj, ground):
+        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj, next(iter(grounds), None)):
             still.append(settings.name_of(obj))
     return still
 

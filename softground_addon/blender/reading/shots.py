@@ -14,7 +14,7 @@ from ...core.composers.relief_plan import IMAGE
 from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
 from ...core.findings import Finding
-from ...core.ground.hard_ground import soft_ground
+from ...core.ground.hard_ground import HardOnSoft, soft_ground
 from ...core.ground.heightfield import Terrain
 from ...core.ground.regions import MOST as MOST_KINDS
 from ...core.ground.regions import Regions
@@ -68,6 +68,9 @@ class Shot:
         What the user should know of how it was read.
     frame : GroundFrame or None
         That all of this is in, instead of the world.
+    parts : tuple of Shot
+        Where there are several grounds, each of them by itself, without motions: the others stand on it like hard
+        objects. Then `terrain` is all of them, and `surface` that of the first.
     """
 
     motions: tuple[CharacterMotion, ...]
@@ -79,6 +82,12 @@ class Shot:
     rigs: tuple[ReadRig, ...] = ()
     findings: tuple[Finding, ...] = ()
     frame: GroundFrame | None = None
+    parts: tuple[Shot, ...] = ()
+
+    @property
+    def of_each_ground(self) -> tuple[Shot, ...]:
+        """Its grounds, one by one."""
+        return self.parts or (self,)
 
     @property
     def skins(self) -> dict[str, WornSkin]:
@@ -133,18 +142,26 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
-    if ground is not None:
-        ground_checks.check_usable(ground)
-        ground_slots.check(ground)
-        if len(wanted.kinds[0]) > MOST_KINDS:
-            raise InputError(
-                f"The materials of ground '{ground.name}' name more than {MOST_KINDS - 1} presets: give some of them "
-                "the same one."
-            )
-    for name in wanted.hard_grounds:
-        if fault := ground_checks.hard_fault(settings.resolve(name), ground):
+    for of_ground in wanted.of_each_ground if ground else ():
+        _check_ground(of_ground)
+    beside = [(name, "in Hard Ground") for name in wanted.hard_grounds]
+    for name, where in [*beside, *((name, "beside the ground") for name in wanted.soft_grounds[1:])]:
+        if fault := ground_checks.hard_fault(settings.resolve(name), ground, where):
             raise InputError(fault)
     return ground_frames.framed(scene, wanted)
+
+
+def _check_ground(wanted: BakeSettings) -> None:
+    """Raise InputError if the ground of the settings cannot be used."""
+    assert wanted.ground
+    ground = settings.resolve(wanted.ground)
+    ground_checks.check_usable(ground)
+    ground_slots.check(ground)
+    if len(wanted.kinds[0]) > MOST_KINDS:
+        raise InputError(
+            f"The materials of ground '{ground.name}' name more than {MOST_KINDS - 1} presets: give some of them "
+            "the same one."
+        )
 
 
 def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
@@ -160,34 +177,54 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        terrain, missing = yield from _with_hard(scene, wanted, motions, plan.terrain, np.stack([lower, upper]))
+        bounds = np.stack([lower, upper])
+        terrain, _, missing = yield from _with_hard(scene, wanted, motions, [plan.terrain], bounds)
         return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
     yield Progress("sample", 1.0)
-    ground = settings.resolve(wanted.ground)
-    painted = painted_ground.names_of(ground, wanted.painted)
-    of_slots = wanted.kinds[1]
-    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
-    surface = yield from meanwhile(Progress("sample", 1.0), looking)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
     bounds = np.stack([places.min(axis=0), places.max(axis=0)])
-    binning = meanwhile(Progress("sample", 1.0), ground_surface.terrain_of.slices(surface, bounds))
-    soft = yield from reused(Progress("sample", 1.0), "terrain", (surface, bounds), binning)
-    hard_parts = yield from meanwhile(Progress("sample", 1.0), ground_surface.hard_part.slices(surface, bounds))
-    terrain, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
-    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs, (*findings, *missing), wanted.frame)
+    surfaces, soft, hard_parts = [], [], []
+    for of_ground in wanted.of_each_ground:
+        surface, terrain, hard = yield from _looked_at(of_ground, bounds)
+        surfaces.append(surface)
+        soft.append(terrain)
+        hard_parts += hard
+    terrain, apart, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
+    shot = Shot(tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*findings, *missing), wanted.frame)
+    alone = replace(shot, motions=(), rigs=(), findings=())
+    parts = [
+        replace(alone, surface=surface, terrain=terrain, frame=of_ground.frame)
+        for surface, terrain, of_ground in zip(surfaces, apart, wanted.of_each_ground, strict=False)
+    ]
+    return replace(shot, parts=tuple(parts))
+
+
+def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, MeshTerrain, list[MeshTerrain]]]:
+    """The surface of the ground of the settings, and what of it is soft and is hard within bounds in the plane [m]."""
+    assert wanted.ground
+    now, ground = Progress("sample", 1.0), settings.resolve(wanted.ground)
+    painted = painted_ground.names_of(ground, wanted.painted)
+    of_slots = wanted.kinds[1]
+    looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
+    surface = yield from meanwhile(now, looking)
+    binning = ground_surface.terrain_of.slices(surface, bounds, is_one_of_several=bool(wanted.grounds))
+    name = surface.name if wanted.grounds else ""
+    soft = yield from reused(now, "terrain", (surface, bounds), meanwhile(now, binning), of=name)
+    hard_parts = yield from meanwhile(now, ground_surface.hard_part.slices(surface, bounds))
+    return surface, soft, hard_parts
 
 
 def _with_hard(
     scene: bpy.types.Scene,
     wanted: BakeSettings,
     motions: list[CharacterMotion],
-    ground: Terrain,
+    grounds: Sequence[Terrain],
     bounds: Array,
     hard_parts: Sequence[MeshTerrain] = (),
-) -> Job[tuple[Terrain, list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, ground, bounds, hard_parts)
+) -> Job[tuple[Terrain, list[HardOnSoft], list[Finding]]]:
+    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, grounds, bounds, hard_parts)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 

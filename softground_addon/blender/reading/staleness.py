@@ -33,9 +33,10 @@ from . import input_hashes
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
 ANIMATION, PLACE, MOVEMENT, BODY, SOLE = "animation", "place", "movement", "body", "sole"
 HARD = "hard"
+BESIDE = "beside"
 VERSION = "version"
 _OF_MOVERS = (ANIMATION, PLACE, MOVEMENT, BODY, HARD)
-_OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE, HARD)
+_OF_VERSION = (SURFACE, MOVEMENT, BODY, SOLE, HARD, BESIDE)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _UNKNOWN = "The bake has no record of its settings"
@@ -50,6 +51,7 @@ CHANGED = {
     BODY: "The mesh of '{name}' that prints has changed",
     SOLE: "The mesh of '{name}', whose sole presses steps, has changed",
     HARD: "The mesh or the position of '{name}', which is hard ground, has changed",
+    BESIDE: "Another ground than '{name}' has changed",
 }
 """What is said of each kind of change."""
 
@@ -117,7 +119,7 @@ def reasons(ground: bpy.types.Object | None, objects: settings.Objects, wanted: 
         changed = [(kind, name) for kind, name in _changes(then, now) if kind not in left_out]
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
         return (translated(_UNKNOWN),)
-    named = {GROUND: ground.name, SURFACE: ground.name, PRINTS: display_mesh.name}
+    named = {GROUND: ground.name, SURFACE: ground.name, BESIDE: ground.name, PRINTS: display_mesh.name}
     texts = [translated(CHANGED.get(kind, _UNKNOWN), name=named.get(kind, name)) for kind, name in changed]
     return tuple(dict.fromkeys(texts))
 
@@ -153,8 +155,8 @@ def _deletion_of(ground: bpy.types.Object | None) -> tuple[str, ...]:
 
 
 def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]:
-    """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and the
-    hard objects that bear them."""
+    """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and what
+    bears them beside the ground."""
     ground = settings.resolve(wanted.ground) if wanted.ground else None
     movers = [obj for character in wanted.characters for obj in movers_of(character)]
     return {
@@ -163,7 +165,14 @@ def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{character.name}": _of_body(objects, character) for character in wanted.characters},
         **{f"{HARD}:{name.name}": _of_hard(settings.resolve(name)) for name in wanted.hard_grounds},
+        **({BESIDE: _of_others(wanted)} if wanted.grounds else {}),
     }
+
+
+def _of_others(wanted: BakeSettings) -> str:
+    """Hash of the further grounds, whichever of all is the first now."""
+    others = [(settings.resolve(further.ground), further.painted) for further in wanted.grounds]
+    return input_hashes.joined(sorted(f"{_of_ground(obj)}{_of_surface(obj, painted)}" for obj, painted in others))
 
 
 def _of_hard(obj: bpy.types.Object) -> str:
@@ -210,9 +219,12 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
         "regions": (),
         "gravity_direction": DOWN,
         "under": "AUTO",
+        "grounds": (),
     }
     whole: dict[str, Any] = unsaid | dict(inputs)
+    further = sorted(report.hash_inputs({**ground, "ground": ""}) for ground in whole["grounds"])
     compared = whole | {"ground": "", "characters": nameless, "hard_grounds": len(whole["hard_grounds"])}
+    compared["grounds"] = further
     return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in compared.items()}
 
 

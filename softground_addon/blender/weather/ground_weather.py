@@ -124,7 +124,15 @@ def _check_names(display_mesh: bpy.types.Object) -> None:
 
 
 def felt(wanted: BakeSettings) -> BakeSettings:
-    """Settings with the weather that is on their ground, where steps feel it."""
+    """Settings with the weather that is on each of their grounds, where steps feel it."""
+    further = [
+        replace(ground, weather=_felt(of_ground).weather)
+        for ground, of_ground in zip(wanted.grounds, wanted.of_each_ground[1:], strict=True)
+    ]
+    return replace(_felt(wanted), grounds=tuple(further))
+
+
+def _felt(wanted: BakeSettings) -> BakeSettings:
     ground = settings.find(wanted.ground) if wanted.weather and wanted.ground else None
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
     if wanted.weather is None or modifier is None or modifier.node_group is None:

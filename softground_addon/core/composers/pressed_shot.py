@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
-from ..checks.volumes import check_volumes
 from ..errors import InputError
 from ..findings import Finding
+from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.soft_ground import SoftGround
 from ..loads.cell_limits import check_cell_size
-from ..loads.estimate import CharacterLoads
+from ..loads.estimate import CharacterLoads, follows_landings
+from ..loads.shared_ground import grounds_under, loads_on
 from ..motion.motion import CharacterMotion, shortest_sole
 from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
@@ -31,18 +33,21 @@ from .simulation import simulate
 
 @dataclass(frozen=True)
 class PressedShot:
-    """Loads, record and responses of a shot.
+    """Loads, records and responses of a shot.
 
     Attributes
     ----------
-    record : BakeRecord
-        Its steps, as they are and as they are edited.
+    shares : list of list of CharacterLoads
+        What of the loads each ground bears.
+    records : list of BakeRecord
+        The steps of each ground, as they are and as they are edited.
     forces : dict or None
         The force on each sole at each frame [N], for the report; None where it is not asked for.
     """
 
     loads: list[CharacterLoads]
-    record: BakeRecord
+    shares: list[list[CharacterLoads]]
+    records: list[BakeRecord]
     forces: dict[str, object] | None
     responses: list[CharacterResponse]
 
@@ -61,9 +66,9 @@ def press_shot(
     motions: Sequence[CharacterMotion],
     standing: Sequence[CharacterMotion],
     loads: list[CharacterLoads],
-    ground: SoftGround,
+    terrain: Terrain,
+    grounds: Sequence[SoftGround],
     edits: Mapping[str, StepEdit],
-    factors: Array | None = None,
     seen: list[Footprint] | None = None,
 ) -> Generator[int | None, None, PressedShot]:
     """Footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
@@ -77,8 +82,10 @@ def press_shot(
         As they were read, and as they will walk.
     loads : list of CharacterLoads
         From `loads_standing`.
-    factors : (V, 3) float array, optional
-        What is painted on the ground.
+    terrain : Terrain
+        On which they were found.
+    grounds : sequence of SoftGround
+        All that takes prints, in the order of `wanted.of_each_ground`.
     seen : list of Footprint, optional
         Takes each print as soon as its contact ends, for a preview; where bodies lean, that of the first pass.
 
@@ -91,29 +98,50 @@ def press_shot(
     ------
     InputError
         If the cells are too small for the shot.
-    BakeError
-        If a footprint breaks an invariant.
     """
-    terrain, asked = ground.terrain, wanted.response
+    asked = wanted.response
+    shares = yield from _shares(wanted, standing, loads, terrain)
     if wanted.carves:
-        yield from _check_carving(wanted, loads, ground)
-    footprints, forces = yield from _simulate(wanted, loads, ground, seen)
+        for of_ground in zip(wanted.of_each_ground, shares, grounds, strict=True):
+            yield from _check_carving(*of_ground)
+    footprints, forces = yield from _pressed(wanted, shares, grounds, seen)
     before = None
     for _ in range(LEAN_PASSES):
-        record = yield from _edited(wanted, ground, footprints, edits)
+        records = yield from _edited(wanted, grounds, footprints, edits)
         yield None
-        now = yield from leaning.slices(loads, standing, terrain, record.edited, asked)
+        now = yield from leaning.slices(loads, standing, terrain, records, asked)
         if not leans_anew(now, before):
             break
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        footprints, forces = yield from _simulate(wanted, loads, ground)
-    check_volumes(footprints, ground, factors)
-    yield None
-    record = yield from _edited(wanted, ground, footprints, edits)
-    responses = yield from responses_of.slices(loads, motions, terrain, record, asked)
-    return PressedShot(loads, record, forces, responses)
+        shares = yield from _shares(wanted, now.motions, loads, terrain)
+        footprints, forces = yield from _pressed(wanted, shares, grounds)
+    records = yield from _edited(wanted, grounds, footprints, edits)
+    responses = yield from responses_of.slices(loads, motions, terrain, records, asked)
+    return PressedShot(loads, shares, records, forces, responses)
+
+
+def _shares(
+    wanted: BakeSettings, motions: Sequence[CharacterMotion], loads: list[CharacterLoads], terrain: Terrain
+) -> Slices[list[list[CharacterLoads]]]:
+    """What of the loads each ground bears: all of it, if it is the only one."""
+    several = soft_ground(terrain)
+    if not isinstance(several, SeveralGrounds):
+        return [loads]
+    shares, models = [], [character.force_model for character in wanted.characters]
+    under = {id(character): grounds_under(character, several) for character in loads}
+    # Landings last as long as the ground needs to give way, which is another time on each.
+    same = [not follows_landings(*each) for each in zip(motions, models, strict=True)]
+    known = list(compress(zip(motions, loads, strict=True), same))
+    for number, made_with in enumerate(wanted.of_each_ground):
+        of_ground = loads
+        if number and not all(same):
+            of_ground = yield from loads_of_shot.slices(made_with, motions, terrain, known)
+        on = [under[id(one)] if id(one) in under else grounds_under(one, several) for one in of_ground]
+        shares.append([loads_on(one, where, number) for one, where in zip(of_ground, on, strict=True)])
+        yield
+    return shares
 
 
 def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
@@ -127,16 +155,48 @@ def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground
 
 
 def _edited(
-    wanted: BakeSettings, ground: SoftGround, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
-) -> Slices[BakeRecord]:
-    record = BakeRecord(footprints, {})
-    return (yield from with_edits.slices(record, edits, ground, wanted.cell_size_m)) if edits else record
+    wanted: BakeSettings,
+    grounds: Sequence[SoftGround],
+    footprints: Sequence[Sequence[Footprint]],
+    edits: Mapping[str, StepEdit],
+) -> Slices[list[BakeRecord]]:
+    """The record of each ground, with the edits of its steps; the first has those whose steps no ground has."""
+    others = [name for of_ground in footprints[1:] for name in edits.keys() - without_step(of_ground, edits)]
+    records = []
+    for number, (ground, of_ground) in enumerate(zip(grounds, footprints, strict=True)):
+        lacking = {*others} if number == 0 else {*without_step(of_ground, edits)}
+        its_edits = {name: edit for name, edit in edits.items() if name not in lacking}
+        record = BakeRecord(of_ground, {})
+        if its_edits:
+            record = yield from with_edits.slices(record, its_edits, ground, wanted.cell_size_m)
+        records.append(record)
+    return records
+
+
+def _pressed(
+    wanted: BakeSettings,
+    shares: Sequence[Sequence[CharacterLoads]],
+    grounds: Sequence[SoftGround],
+    seen: list[Footprint] | None = None,
+) -> Generator[int | None, None, tuple[list[list[Footprint]], dict[str, object] | None]]:
+    """The footprints of each ground, and the forces on all of them."""
+    results: list[tuple[list[Footprint], dict[str, object] | None]] = []
+    for of_ground in zip(wanted.of_each_ground, shares, grounds, strict=True):
+        results.append((yield from _simulate(*of_ground, len(results), len(grounds), seen)))
+    return [footprints for footprints, _ in results], results[0][1]
 
 
 def _simulate(
-    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround, seen: list[Footprint] | None = None
+    wanted: BakeSettings,
+    loads: Sequence[CharacterLoads],
+    ground: SoftGround,
+    number: int,
+    count: int,
+    seen: list[Footprint] | None,
 ) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
-    """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
+    """The footprints of one of so many grounds in the order of their first contact; on request, the force on each sole
+    at each frame [N]."""
+    before = number * (wanted.frames[1] - wanted.frames[0] + 1)
     footprints: list[Footprint] = []
     check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
     frames: list[float] = []
@@ -148,7 +208,7 @@ def _simulate(
         frames.append(result.frame)
         if wanted.keep_forces:
             forces.append(result.forces)
-        yield len(frames)
+        yield (before + len(frames)) // count
     footprints.sort(
         key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
     )

@@ -17,7 +17,7 @@ from ..loads.raised_rests import stands_on_hard
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
-from ..record.ground_history import GroundHistory
+from ..record.ground_history import pressed_history
 from ..record.record import BakeRecord
 from ..response.leaving import leaving_early
 from ..response.moved_steps import Followed, OutOfReach, follow
@@ -82,11 +82,14 @@ def leaning(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    footprints: Sequence[Footprint],
+    records: Sequence[BakeRecord],
     options: ResponseOptions | None,
 ) -> Slices[Leaning]:
-    """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
-    moved, leans, history = [], [], GroundHistory(terrain, footprints)
+    """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt.
+
+    `records` has that of each ground.
+    """
+    moved, leans, history = [], [], pressed_history(terrain, [record.edited for record in records])
     if options is not None and options.tilt is not None:
         for of_character, motion in zip(loads, motions, strict=True):
             if motion.centre is not None:
@@ -112,20 +115,28 @@ def responses_of(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    record: BakeRecord,
+    records: Sequence[BakeRecord],
     options: ResponseOptions | None,
 ) -> Slices[list[CharacterResponse]]:
-    """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps."""
+    """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps.
+
+    `records` has that of each ground.
+    """
     responses: list[CharacterResponse] = []
     if options is None:
         return responses
-    history = GroundHistory(terrain, record.edited)
+    history = pressed_history(terrain, [record.edited for record in records])
+    footprints, edited = (
+        [footprint for part in parts for footprint in part]
+        for parts in ([record.footprints for record in records], [record.edited for record in records])
+    )
+    edits = {name: edit for record in records for name, edit in record.edits.items()}
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
-        followed = follow(motion, touching, record.footprints, record.edits) if options.grounding else Followed()
-        standing = leaving_early(motion, touching, record.edited) if options.grounding else touching
+        followed = follow(motion, touching, footprints, edits) if options.grounding else Followed()
+        standing = leaving_early(motion, touching, edited) if options.grounding else touching
         yield
         response = yield from respond.slices(
             motion,
@@ -140,7 +151,7 @@ def responses_of(
         before = yield from gaps.slices(motion, standing, history)
         yield
         after = yield from gaps.slices(responding(motion, response), standing, history)
-        sinkage = mean_sinkage(record.edited, motion.name)
+        sinkage = mean_sinkage(edited, motion.name)
         responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses
 
@@ -151,7 +162,7 @@ def gap_table(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    footprints: Sequence[Footprint],
+    records: Sequence[BakeRecord],
 ) -> Slices[dict[str, object]]:
     """Penetration and float of the standing soles before and after [mm], for the report.
 
@@ -162,7 +173,7 @@ def gap_table(
             when: {character.motion.name: _statistics(getattr(character, when)) for character in responses}
             for when in ("before", "after")
         }
-    table, history = {}, GroundHistory(terrain, footprints)
+    table, history = {}, pressed_history(terrain, [record.edited for record in records])
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)
         yield

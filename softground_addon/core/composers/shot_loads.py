@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
 from ..errors import InputError
-from ..ground.hard_ground import soft_ground
+from ..findings import listed
+from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.terrain import MeshTerrain
 from ..loads.estimate import CharacterLoads, estimate_loads
@@ -45,12 +47,12 @@ def loads_of_shot(
         work = estimate_loads.slices(moved, terrain, force_model=character.force_model, material=wanted.material)
         loads.append((yield from work))
         yield
-    _check_contacts(loads, terrain, wanted.ground.name if wanted.ground else None)
+    _check_contacts(loads, terrain, [ground.name for ground in wanted.soft_grounds])
     return loads
 
 
-def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
-    """Raise InputError if nothing touches the ground of that name, or it lies overhead or in layers under a foot."""
+def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, grounds: Sequence[str]) -> None:
+    """Raise InputError if nothing touches the grounds of those names, or they lie overhead or in layers underfoot."""
     place = np.concatenate(
         [
             sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
@@ -58,16 +60,20 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: s
             for number, sole in enumerate(character.motion.soles)
         ]
     )
-    terrain = soft_ground(terrain)
-    name = f"'{ground}'" if ground else "the ground"
+    whole = soft_ground(terrain)
+    parts = whole.grounds if isinstance(whole, SeveralGrounds) else (whole,)
+    name = listed(grounds) or "the ground"
     if not any(character.contacts.standing.any() for character in loads):
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         message = f"No foot of {characters} touches {name} in these frames"
         raise InputError(message, "no_contact", remedy="move the ground under the feet, or correct the feet.")
-    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
+    layered = [
+        isinstance(part, MeshTerrain) and not part.is_height_field(place[:, 0], place[:, 1]).all() for part in parts
+    ]
+    if any(layered):
         raise InputError(
-            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own.",
+            f"Ground {listed(compress(grounds, layered)) or name} has several layers one above the other under the "
+            "feet, such as a bridge or an overhang: separate the layer that is walked on into an object of its own.",
             "layered_ground",
         )
     for character in loads:

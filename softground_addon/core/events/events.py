@@ -80,7 +80,7 @@ def events(
         for phase in of_character:
             yield
             rows.append(_row(character, phase, steps, surface, first_frame, soles[phase.sole]))
-    return _in_order(rows)
+    return in_order(rows)
 
 
 def as_edited(
@@ -106,10 +106,11 @@ def as_edited(
         of_left = {row["step"]: row for row in reversed(rows)}
         wading = ((of_left.get(step.name), step, carves.get(step.index)) for step in steps)
         rows += [_wade(row, step, carve) for row, step, carve in wading if row and carve and _is_cut(carve)]
-    return _in_order(rows)
+    return in_order(rows)
 
 
-def _in_order(rows: Iterable[Event]) -> list[Event]:
+def in_order(rows: Iterable[Event]) -> list[Event]:
+    """Rows by time, character and contact."""
     return sorted(rows, key=lambda row: (row["frame"], row["character"], row["contact"]))
 
 

@@ -314,11 +314,11 @@ def _thump(step: SoundStep, voice: Voice, random: np.random.Generator, since: Ar
 
 def _brought(step: SoundStep, voice: Voice, random: np.random.Generator, clock: Array) -> Array:
     """What a film on the sole adds on a hard floor."""
-    if step.carried == "sand":
+    if step.carried in surfaces.GRINDING:
         return step.film * _hiss(step, voice, random, clock)
     if step.lifted is None:
         return np.zeros(len(clock))
-    if step.carried == "mud":
+    if step.carried in surfaces.SQUELCHING:
         return _pop(step, random, clock - step.lifted + POP_LENGTH, FULL_POP * step.film)
     low, high = SQUEAK_PITCH
     part = np.clip((clock - step.lifted) / SQUEAK + 1.0, 0.0, 1.0)

@@ -25,7 +25,7 @@ def build(
     *,
     inputs: Mapping[str, object],
     input_hash: str,
-    steps: Sequence[EditableStep],
+    steps: Sequence[tuple[EditableStep, str]],
     edits: Mapping[str, StepEdit] = MappingProxyType({}),
     offsets_mm: Mapping[str, Mapping[str, float]],
     timings: Mapping[str, float],
@@ -37,7 +37,7 @@ def build(
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
     carried_kg: Mapping[str, float] | None = None,
-    carves: Mapping[int, Footprint] | None = None,
+    carves: Sequence[Footprint] = (),
 ) -> dict[str, Any]:
     """The whole report of a bake, ready for JSON.
 
@@ -47,10 +47,11 @@ def build(
         The settings of the bake, in SI units.
     input_hash : str
         From `hash_inputs`, of all inputs but the edits: with these, it is equal for bakes with equal inputs.
-    steps : sequence of EditableStep
-        Of the `BakeRecord`. Those that made no print, or were muted, have `left_out`.
+    steps : sequence of (EditableStep, str)
+        Of all `BakeRecord`s, each with the name of its ground if there are several. Those that made no print, or were
+        muted, have `left_out`.
     edits : mapping
-        Of the `BakeRecord`: why they are not as they were baked.
+        Of the `BakeRecord`s: why they are not as they were baked.
     offsets_mm : mapping of character to (sole to mm)
         Constant float (positive) or sink of the source animation that was taken out of each sole.
     timings : mapping
@@ -71,12 +72,12 @@ def build(
         From `core.events.events`.
     carried_kg : mapping, optional
         Masses that soles carried onto hard floors, of a `core.carried.film.CarriedMass`.
-    carves : mapping of int to Footprint, optional
-        `laid_carves` of the `BakeRecord`.
+    carves : sequence of Footprint
+        `laid_carves` of the `BakeRecord`s.
     """
-    rows = [_step(step) for step in steps]
+    rows = [_step(step) | ({"ground": ground} if ground else {}) for step, ground in steps]
     counted = [row for row in rows if not row.get("left_out")]
-    shown = [step.footprint for step in steps if step.footprint]
+    shown = [step.footprint for step, _ in steps if step.footprint]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
@@ -89,7 +90,7 @@ def build(
             "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
-            "thrown_m3": sum(sum(step.thrown.values()) for step in steps),
+            "thrown_m3": sum(sum(step.thrown.values()) for step, _ in steps),
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
@@ -100,8 +101,8 @@ def build(
     if carried_kg is not None:
         report["totals"]["carried_kg"] = dict(carried_kg)
     if carves:
-        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in carves.values())
-        report["carved"] = _carved(carves.values())
+        report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in carves)
+        report["carved"] = _carved(carves)
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:

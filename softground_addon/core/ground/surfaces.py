@@ -162,6 +162,8 @@ class CarriedFilm:
 
 CARRIED_KINDS = ("mud", "sand", "snow", "water", "paint")
 """What soles carry, in the order of the numbers by which marks name it."""
+GRINDING, SQUELCHING = ("sand",), ("mud",)
+"""Kinds that grind under soles on hard floors, and that squelch as these leave; soles with others squeak."""
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def beyond_edge(motion: CharacterMotion, terrain: Terrain) -> Terrain:
     if isinstance(terrain, FlatTerrain | SlopingTerrain):  # they are endless
         return terrain
     steps = np.arange(0, len(motion.frames), EVERY)
-    places = np.concatenate([_spots(sole, steps).reshape(-1, 2) for sole in motion.soles])
+    places = np.concatenate([spots(sole, steps).reshape(-1, 2) for sole in motion.soles])
     known = np.isfinite(terrain.heights(*places.T))
     if known.all() or not known.any():
         return terrain
@@ -129,7 +129,7 @@ def _has_ground(
     """True where some of a sole is over ground, and at most at a level above it [m], (N,)."""
 
     def highest(part: slice) -> Array:
-        x, y, *z = np.moveaxis(_spots(sole, steps[part], axes=2 if level == np.inf else 3), -1, 0)
+        x, y, *z = np.moveaxis(spots(sole, steps[part], axes=2 if level == np.inf else 3), -1, 0)
         height = heights(x, y)
         near = np.where(z[0] - height <= level, height, np.nan) if z else height
         return np.asarray(np.fmax.reduce(near, axis=1))
@@ -137,7 +137,7 @@ def _has_ground(
     return np.isfinite(in_stretches(highest, len(steps)))
 
 
-def _spots(sole: SoleMotion, steps: NDArray[np.intp], axes: int = 2) -> Array:
+def spots(sole: SoleMotion, steps: NDArray[np.intp], axes: int = 2) -> Array:
     """Places all over a sole, by x, y and perhaps z, (N, K, axes) [m]."""
     spots = [sole.landmark_positions()[steps, :, :axes]]
     for number, patch in enumerate(sole.sole.patches):

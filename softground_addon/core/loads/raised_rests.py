@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ground.hard_ground import HardOnSoft, Reach
+from ..ground.hard_ground import HardOnSoft, Reach, SeveralGrounds, soft_ground, up_to
 from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Array
@@ -85,7 +85,15 @@ def carried_by(
 
 
 def stands_on_hard(motion: CharacterMotion, terrain: Terrain) -> bool:
-    """True if a motion was made for the hard objects of a terrain: soles rest on them as it is."""
+    """True if a motion was made for the hard objects of a terrain, or the further of several grounds: soles rest on
+    them as it is."""
+    soft = soft_ground(terrain)
+    if isinstance(soft, SeveralGrounds):
+
+        def highest(x: Array, y: Array, limit: Array) -> Array:
+            return up_to(terrain, limit).heights(x, y)
+
+        return any(carried_by(highest, list(raised_rests(motion, ground)), ground) for ground in soft.grounds)
     if not isinstance(terrain, HardOnSoft):
         return False
     return bool(carried_by(terrain.hard.heights, list(raised_rests(motion, terrain.ground)), terrain.ground))

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.sparse_grid import Window
 from ..numerics.arrays import Array
@@ -79,6 +80,36 @@ class GroundHistory:
             & (row.min() < first_row + rows)
             & (when.max() >= self._starts - 1e-6)
         ).tolist()
+
+
+class SeveralHistories(GroundHistory):
+    """The same of several grounds, each with footprints of its own: where one bears, its prints change it.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        All of them, perhaps with hard objects.
+    """
+
+    def __init__(self, terrain: Terrain, grounds: SeveralGrounds, footprints: Sequence[Sequence[Footprint]]) -> None:
+        super().__init__(terrain)
+        self._grounds, self._parts = grounds, [GroundHistory(terrain, each) for each in footprints]
+
+    def change(self, x: Array, y: Array, frame: Array) -> Array:
+        """See `GroundHistory`."""
+        numbers, total = self._grounds.numbers(x, y), np.zeros(np.shape(x))
+        for number, part in enumerate(self._parts):
+            on = numbers == number
+            total[on] = part.change(x[on], y[on], frame[on])
+        return total
+
+
+def pressed_history(terrain: Terrain, footprints: Sequence[Sequence[Footprint]]) -> GroundHistory:
+    """The history of the ground of a terrain, or of its several grounds, each with its footprints."""
+    grounds = soft_ground(terrain)
+    if isinstance(grounds, SeveralGrounds):
+        return SeveralHistories(terrain, grounds, footprints)
+    return GroundHistory(terrain, footprints[0])
 
 
 def _series(footprint: Footprint) -> _Print:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.hard_ground import through
 from ..ground.heightfield import FlatTerrain, Terrain
 from ..legs.foot_lock import moved
 from ..legs.foot_placement import Placement, lowest_clearance, place_sole, posed_points
@@ -272,7 +273,7 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> Slices[CharacterMotio
         return motion
     made_for = _contacts_with_level(motion)
     yield
-    if made_for is None or not _fits_better(motion, made_for, detect_contacts(motion, terrain)):
+    if made_for is None or not _fits_better(motion, made_for, detect_contacts(motion, through(terrain))):
         return motion
     yield
     ground = GroundHistory(terrain)

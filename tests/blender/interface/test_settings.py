@@ -27,6 +27,7 @@ NO_INPUT = {
     "grounding.by_button": "what Clear Bake switches off again",
     "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
+    "active_ground": "which one the list shows",
     "active_hard_ground": "which one the list shows",
     "characters.active_hold": "which one the list shows",
     "characters.active_joint": "which one the list shows",
@@ -51,6 +52,9 @@ def all_on(scene):
     options.ground, options.frame_end = plane(scene), 40
     options.hard_grounds.add().object = plane(scene, size=0.5, vertices=2)
     options.hard_grounds[0].object.location.x = 20.0
+    options.grounds.add().object = plane(scene, size=0.5, vertices=2)
+    options.grounds[0].object.location.x = 30.0
+    options.grounds[0].material.preset = "Mine"  # and no more as the first
     options.tread_pattern, options.tread_image = "IMAGE", bpy.data.images.new("Sole", 4, 8)
     options.tilt.use = options.grounding.use = True
     options.characters[0].holds.add().foot = "foot.L"
@@ -125,6 +129,9 @@ def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot)
         "grounding.name",
         "characters.holds.name",
         "hard_grounds.name",
+        "grounds.name",
+        "grounds.material.name",
+        "grounds.painted.name",
     }  # groups that have no list
     assert seen - changing - unused == set(NO_INPUT)
 

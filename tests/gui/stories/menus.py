@@ -35,7 +35,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 
     # the preset menu
     with menu_timed("SOFTGROUND_MT_presets") as seconds:
-        add = yield from hand.find_button("softground.save_preset", offset=0.76)
+        add = yield from hand.find_button("softground.save_preset", offset=0.83)
         for number in range(3):
             yield from hand.click(add[0] - 120, add[1])
             yield 1.0

@@ -1,0 +1,418 @@
+"""Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import further_grounds, jobs, preset_files, settings
+from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
+from softground_addon.blender.baking.publish import READY
+from softground_addon.blender.carried import marks_object
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.playback import weather_modifier
+from softground_addon.blender.reading import analysis
+from softground_addon.core.record.edits import StepEdit
+from tests.blender import command_line, fingerprints, shots
+from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
+from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, curves_of, lift
+from tests.blender.grounds import as_rendered, bake, plane, refusal
+
+CRATE, DECK = "Crate", 0.2
+GRAZE = 4.0
+"""Contacts that are shorter are of a foot that swings against the edge of the crate, in it or not [frames]."""
+
+
+def over_a_crate(scene):
+    """A walk that is keyed over a crate on a floor, which is the first ground."""
+    rig = shots.walker(scene, frames=84)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.ground, options.cell_size = plane(scene, size=9.0, vertices=200), 0.02
+    options.debris = options.marks = False
+    box(scene, CRATE, DECK)
+    lift(rig, DECK)
+    bpy.context.view_layer.update()
+
+
+@pytest.fixture
+def crate(opened_as):
+    opened_as(over_a_crate)
+    return bpy.data.objects[CRATE]
+
+
+def also(*objects):
+    return [further_grounds.add(bpy.context.scene.softground, obj) for obj in objects][-1]
+
+
+def record_of(ground):
+    return baked_ground.record_of(ground)
+
+
+def prints_on(ground):
+    return record_of(ground).footprints
+
+
+def test_each_step_prints_on_the_ground_under_it(crate):
+    scene = bpy.context.scene
+    also(crate)
+    result, floor = bake(scene), scene.softground.ground
+    assert result.report["warnings"] == []
+    on = {name: [row for row in result.report["steps"] if row["ground"] == name] for name in ("Field", CRATE)}
+    assert len(on[CRATE]) >= 2
+    assert len(on["Field"]) >= 4
+    assert all(abs(row["position"][2] - DECK) < 1e-3 for row in on[CRATE])
+    assert all(abs(row["position"][2]) < 1e-3 for row in on["Field"])
+    assert [len(prints_on(ground)) for ground in (floor, crate)] == [len(on["Field"]), len(on[CRATE])]
+    assert not below(prints_on(floor))
+    scene.frame_set(84)
+    x, y, z = as_rendered(baked_ground.display_mesh_of(crate)).T
+    within = (np.abs(x) < 0.45) & (y > LOW + 0.05) & (y < HIGH - 0.05) & (z > DECK / 2)
+    assert DECK - z[within].min() == pytest.approx(max(step.max_depth_m for step in prints_on(crate)), abs=0.005)
+
+
+def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    settings_of = ("Snow", "Mud")
+    bpy.ops.softground.load_preset(name=settings_of[0])
+    scene.softground.cell_size = 0.02
+    further_grounds.own_material(scene.softground, item)
+    for field, value in vars(preset_files.named("mud").material).items():
+        setattr(item.material, field, value)
+    item.material.surface = "mud"
+    bake(scene)
+    together = {ground: prints_on(ground) for ground in (floor, crate)}
+    events = {ground: {row["surface"] for row in baked_ground.events_of(ground)} for ground in (floor, crate)}
+    assert events == {floor: {"snow"}, crate: {"mud"}}
+    scene.softground.grounds.clear()
+    for ground, other, preset in ((floor, crate, "Snow"), (crate, floor, "Mud")):
+        scene.softground.hard_grounds.clear()
+        bpy.ops.softground.load_preset(name=preset)
+        scene.softground.cell_size, scene.softground.debris = 0.02, False
+        scene.softground.ground = ground
+        scene.softground.hard_grounds.add().object = other
+        bake(scene)
+        alone = {(step.sole, round(step.start_frame, 6)): step for step in prints_on(ground)}
+        assert len(together[ground]) == len(alone) >= 2
+        for step in (step for step in together[ground] if step.end_frame - step.start_frame > GRAZE):
+            same = alone[step.sole, round(step.start_frame, 6)]
+            assert step.max_depth_m == pytest.approx(same.max_depth_m, rel=1e-6)
+            assert step.compressed_m3 == pytest.approx(same.compressed_m3, rel=1e-6)
+            assert step.rim_m3 == pytest.approx(same.rim_m3, rel=1e-6)
+
+
+def test_a_further_ground_that_nobody_walks_on_changes_nothing_bit_for_bit(walk):
+    scene = bpy.context.scene
+    scene.softground.ground, scene.softground.cell_size = plane(scene, size=9.0, vertices=200), 0.02
+    scene.softground.detail = "NEVER"
+    before = bytes_of(bake(scene).footprints)
+    deck, aside = box(scene, "Deck", 2.2, y=(-9, 9), bottom=2.0), box(scene, "Aside", 0.3, x=(11.5, 12.0), y=(-9, 9))
+    bpy.context.view_layer.update()
+    also(deck, aside)
+    result = bake(scene)
+    assert bytes_of(result.footprints) == before
+    assert result.report["warnings"] == []
+    assert not baked_ground.is_baked(deck)
+    assert not baked_ground.is_baked(aside)
+
+
+def test_walkers_below_a_bridge_are_not_on_it_whichever_ground_is_the_first(walk):
+    scene = bpy.context.scene
+    floor = scene.softground.ground = plane(scene, size=9.0, vertices=200)
+    scene.softground.cell_size, scene.softground.detail = 0.02, "NEVER"
+    item = also(box(scene, "Bridge", 2.2, y=(-9, 9), x=(-1, 1), bottom=2.0))
+    bpy.context.view_layer.update()
+    before = bytes_of(bake(scene).footprints)
+    further_grounds.choose(scene.softground, item)
+    assert scene.softground.ground.name == "Bridge"
+    assert bytes_of(bake(scene).footprints) == before
+    assert len(prints_on(floor)) >= 4
+
+
+STAIRS = {"Field": 0.0, "Stair 1": 0.1, "Stair 2": 0.2}
+
+
+def stairs(scene):
+    """A floor and two broad stairs, each an object of its own, up which the walk is keyed."""
+    rig = shots.walker(scene, frames=84)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.ground, options.cell_size = plane(scene, size=9.0, vertices=200), 0.02
+    options.debris = options.marks = False
+    for number, (low, high) in enumerate(((-2.2, -1.0), (-4.0, -2.2)), 1):
+        box(scene, f"Stair {number}", 0.1 * number, y=(low, high))
+        lift(rig, 0.1, low=-9.0, high=high)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.slow
+def test_feet_stand_on_crates_within_a_millimetre_after_clean_feet_and_sink_feet(crate):
+    scene = bpy.context.scene
+    also(crate)
+    cleaned = jobs.run(clean_feet.clean_feet(scene))
+    assert cleaned.feet["after"]["Walker"]["penetration"]["max"] < 1.0
+    assert cleaned.feet["after"]["Walker"]["float"]["max"] < 1.0
+    scene.softground.sink_feet, scene.softground.carve = True, False
+    report = bake(scene).report
+    gaps = report["gaps_mm"]["after"]["Walker"]
+    assert (gaps["penetration"]["max"], gaps["float"]["max"]) < (1.0, 1.0)
+    assert {row["ground"] for row in report["steps"]} == {"Field", CRATE}
+
+
+@pytest.mark.slow
+def test_each_step_up_the_stairs_is_on_the_stair_under_it(opened_as):
+    scene = opened_as(stairs)
+    also(*(bpy.data.objects[name] for name in STAIRS if name != "Field"))
+    result = bake(scene)
+    assert {row["ground"] for row in result.report["steps"]} == set(STAIRS)
+    assert all(abs(row["position"][2] - STAIRS[row["ground"]]) < 1e-3 for row in result.report["steps"])
+
+
+def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
+    scene = bpy.context.scene
+    before = fingerprints.of_file()
+    also(crate)
+    bake(scene)
+    assert baked_ground.is_baked(crate)
+    assert bpy.ops.softground.clear_bake(only_shown=True) == {"FINISHED"}
+    assert [baked_ground.is_baked(ground) for ground in settings.grounds_of(scene.softground)] == [False, True]
+    bake(scene)
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_the_depth_is_predicted_on_all_of_them(crate):
+    scene = bpy.context.scene
+    also(crate)
+    analysis.read(scene)
+    predicted = analysis.expected_depth(scene)
+    assert predicted == pytest.approx(bake(scene).report["totals"]["typical_depth_m"], rel=0.05)
+
+
+def test_undo_gives_all_grounds_back_by_bytes(crate):
+    also(crate)
+    bpy.ops.ed.undo_push(message="Opened")
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    bpy.ops.ed.undo_push(message="Bake")
+    assert baked_ground.is_baked(bpy.data.objects[CRATE])
+    bpy.ops.ed.undo()
+    assert fingerprints.of_file() == before
+
+
+def test_each_ground_goes_with_its_prints_into_another_file(crate, tmp_path):
+    scene, path = bpy.context.scene, str(tmp_path / "shot.blend")
+    also(crate)
+    bake(scene)
+    prints = bytes_of(prints_on(crate))
+    name = baked_ground.display_mesh_of(crate).name
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path) as (_, here):
+        here.objects = [CRATE, name]
+    for each in (CRATE, name):
+        bpy.context.scene.collection.objects.link(bpy.data.objects[each])
+    assert bytes_of(prints_on(bpy.data.objects[CRATE])) == prints
+
+
+def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    floor = scene.softground.ground
+    on_floor = bytes_of(record_of(floor).edited)
+    further_grounds.choose(scene.softground, item)
+    editable = jobs.run(step_edits.reading(scene))
+    step = editable.record.steps[0]
+    jobs.run(step_edits.editing(scene, editable, {step.name: StepEdit(strength=0.5)}))
+    shallow = record_of(crate).edited[0].max_depth_m
+    assert shallow < step.baked.max_depth_m
+    assert bytes_of(record_of(floor).edited) == on_floor
+    assert bake_report.stale_reasons(scene) == ()
+    bake(scene)
+    assert record_of(crate).edited[0].max_depth_m == shallow
+    assert not record_of(floor).edits
+
+
+def test_what_makes_one_ground_outdated_is_said_of_each(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    assert bake_report.stale_reasons(scene) == ()
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == (), "which is shown is no input"
+    scene.softground.material.youngs_modulus *= 2
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    bake(scene)
+    crate.location.z += 0.01
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(scene) == ("Another ground than 'Field' has changed",)
+    further_grounds.choose(scene.softground, item)
+    assert bake_report.stale_reasons(scene) == ("The mesh or the position of 'Crate' has changed",)
+
+
+def test_a_ground_that_is_shown_brings_what_is_set_for_it_and_takes_it_back(crate):
+    options = bpy.context.scene.softground
+    item = also(crate)
+    before = settings.snapshot(bpy.context.scene)
+    further_grounds.choose(options, item)
+    bpy.ops.softground.load_preset(name="Mud")
+    options.under, options.painted.rim = "NEVER", "Mine"
+    further_grounds.choose(options, item)
+    now = settings.snapshot(bpy.context.scene)
+    assert (now.ground, now.material, now.preset, now.painted) == (
+        before.ground,
+        before.material,
+        before.preset,
+        before.painted,
+    )
+    (other,) = now.grounds
+    assert (other.preset, other.surface, other.under, other.painted[2]) == ("Mud", "mud", "NEVER", "Mine")
+
+
+def test_cover_adds_a_ground_and_the_first_stays(crate):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.context.view_layer.objects.active = crate
+    crate.select_set(True)
+    assert bpy.ops.softground.cover(thickness_cm=4.0) == {"FINISHED"}
+    (item,) = options.grounds
+    assert (options.ground, item.object.name) == (floor, "Crate Cover")
+    assert item.material.layer_depth == pytest.approx(0.04)
+    assert (options.under, item.under) == ("AUTO", "NEVER")
+    item.object.location.z -= 0.04  # the walk was made for the crate
+    crate.location.z -= 0.04
+    bpy.context.view_layer.update()
+    result = bake(scene)
+    assert {row["ground"] for row in result.report["steps"]} == {"Field", "Crate Cover"}
+    assert all(row["max_depth_m"] <= 0.04 + 1e-6 for row in result.report["steps"] if row["ground"] != "Field")
+
+
+def test_the_list_is_shown_where_there_are_several_and_its_buttons_act(crate):
+    options = bpy.context.scene.softground
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    assert "Select meshes to walk on" in refusal(bpy.ops.softground.add_ground)
+    crate.select_set(True)
+    assert bpy.ops.softground.add_ground() == {"FINISHED"}
+    assert settings.grounds_of(options) == [options.ground, crate]
+    assert bpy.ops.softground.choose_ground(object=CRATE) == {"FINISHED"}
+    assert options.ground == crate
+    assert "no such" not in refusal(lambda: bpy.ops.softground.choose_ground(object="Nobody"))
+    bpy.ops.softground.remove_ground()
+    assert settings.grounds_of(options) == [crate]
+
+
+def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presses_one(crate):
+    also(crate)
+    assert "Live mode presses one ground" in refusal(bpy.ops.softground.live)
+    crate.keyframe_insert("location", frame=1)
+    crate.location.x = 1.0
+    crate.keyframe_insert("location", frame=40)
+    assert "'Crate' beside the ground moves" in refusal(bpy.ops.softground.bake)
+
+
+def test_the_command_line_names_several_grounds_each_with_its_preset(crate, tmp_path):
+    path, report = tmp_path / "shot.blend", tmp_path / "report.json"
+    bpy.context.scene.softground.ground = None
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    command_line.run("bake", path, "--ground", "Field=Snow", "--ground", "Crate=Mud", "--report", report)
+    result = json.loads(report.read_text())
+    assert {row["ground"] for row in result["steps"]} == {"Field", CRATE}
+    assert result["inputs"]["preset"] == "Snow"
+    assert [ground["preset"] for ground in result["inputs"]["grounds"]] == ["Mud"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["sails", "on_a_map"])
+def test_grounds_that_move_together_or_are_far_away_are_pressed_as_at_rest(crate, how):
+    scene = bpy.context.scene
+    also(crate)
+    before = bake(scene).report["steps"]
+    bpy.ops.softground.clear_bake()
+    hung_up(scene)
+    place = bpy.data.objects["Place"]
+    if how == "sails":
+        for frame, x in ((1, 0.0), (84, 8.3)):
+            place.location.x = x
+            place.keyframe_insert("location", index=0, frame=frame)
+        for curve in curves_of(place):
+            for key in curve.keyframe_points:
+                key.interpolation = "LINEAR"
+    else:
+        moved(scene, WHERE["on_a_map"])
+    scene.frame_set(1)
+    now = bake(scene).report["steps"]
+    assert [row["ground"] for row in now] == [row["ground"] for row in before]
+    for here, there in zip(now, before, strict=True):
+        assert here["max_depth_m"] == pytest.approx(there["max_depth_m"], abs=1e-5)
+        assert here["compressed_m3"] == pytest.approx(there["compressed_m3"], rel=1e-3)
+    assert bake_report.stale_reasons(scene) == ()
+    crate.parent = None
+    if how == "sails":
+        assert "'Crate' beside the ground stands still while 'Place' moves" in refusal(bpy.ops.softground.bake)
+
+
+def test_a_bake_that_is_closed_while_it_writes_leaves_all_grounds_as_they_were(crate):
+    scene = bpy.context.scene
+    also(crate)
+    before = fingerprints.of_file()
+    job = bake_job.bake(scene)
+    for progress in job:
+        if progress is READY:
+            break
+    next(job)
+    job.close()
+    assert fingerprints.of_file() == before
+
+
+def test_a_ground_that_no_step_is_on_any_more_is_cleared(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    assert baked_ground.is_baked(crate)
+    crate.location.x = 3.0
+    bpy.context.view_layer.update()
+    result = bake(scene)
+    assert {row["ground"] for row in result.report["steps"]} == {"Field"}
+    assert not baked_ground.has_remains(crate)
+
+
+def test_weather_is_of_each_ground(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    floor = scene.softground.ground
+    further_grounds.choose(scene.softground, item)
+    bpy.ops.softground.add_weather()
+    modifiers = [weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) for ground in (floor, crate)]
+    assert [modifier is None for modifier in modifiers] == [True, False]
+    scene.softground.steps_feel_weather = True
+    now = settings.snapshot(scene)
+    assert (now.weather.surface, now.grounds[0].weather.surface) == ("snow", "snow")
+    assert bake(scene).report["warnings"] == []
+    assert weather_modifier.modifier_of(baked_ground.display_mesh_of(crate)) is not None
+
+
+def test_marks_and_hard_steps_beside_several_grounds_are_there_once(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    bpy.ops.softground.load_preset(name="Mud")
+    scene.softground.cell_size, scene.softground.debris, scene.softground.marks = 0.02, False, True
+    scene.softground.hard_grounds.add().object = box(scene, "Slab", 0.004, y=(-4.6, -2.6), x=(-1.0, 1.0), bottom=-0.1)
+    bpy.context.view_layer.update()
+    report = bake(scene).report
+    assert {row["ground"] for row in report["steps"]} == {"Field", CRATE}
+    assert all(row["position"][1] > -2.75 for row in report["steps"])
+    hard = [row for row in report["events"] if row["surface"] == "hard"]
+    assert hard
+    assert len({(row["frame"], row["contact"], row["phase"]) for row in hard}) == len(hard)
+    assert all(row["surface"] != "hard" for row in baked_ground.events_of(item.object))
+    assert len(marks_object.of(floor).data.polygons) + len(marks_object.of(crate).data.polygons) > 0
+    assert report["totals"]["carried_kg"]["picked_up"] > 0
