@@ -8,6 +8,7 @@ import subprocess
 import bpy
 import pytest
 
+from softground_addon.blender import session
 from tests.blender import rigs, shots
 
 
@@ -15,6 +16,7 @@ from tests.blender import rigs, shots
 def scene(addon):
     # Not `read_factory_settings`, which takes five times as long: it also enables all of Blender's add-ons anew.
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    session.show_no_bake()  # of a test that failed before
     return bpy.context.scene
 
 
@@ -47,6 +49,7 @@ def opened_as(made_once):
 
         file = made_once("-".join(map(str, (function.__module__, function.__name__, *arguments))), make)
         bpy.ops.wm.read_homefile(filepath=str(file))  # as a new file, which is not saved anywhere
+        session.show_no_bake()
         return bpy.context.scene
 
     return opened

@@ -94,9 +94,8 @@ def test_prints_are_shown_as_they_are_pressed_where_somebody_looks_on(scene):
     assert 0 in counts
     assert counts == sorted(counts)
     record = baked_ground.record_of(scene.softground.ground)
-    assert sorted(map(id, state.pressing.footprints)) == sorted(
-        map(id, state.results["prints", ""][1].record.footprints)
-    )
+    (pressed,) = state.results["prints", ""][1].grounds
+    assert sorted(map(id, state.pressing.footprints)) == sorted(map(id, pressed.record.footprints))
     assert len(record.footprints) == len(state.pressing.footprints) > 0
     session.show_no_bake()
     assert state.pressing is None
