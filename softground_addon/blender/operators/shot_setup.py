@@ -238,12 +238,14 @@ class SOFTGROUND_OT_open_settings(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
         character, shown = active_character(options), None
-        if self.of == "GROUND" and options.ground is not None:
+        if self.of == "GROUND" and settings.exists(options.ground):
             shown = baked_ground.display_mesh_of(options.ground)
         elif character:  # a ground that is not there yet has its settings beside those of the character
             shown = settings.body_of(character)
         if shown is None:
             raise InputError("Add a character first")
+        if not settings.exists(shown):
+            raise InputError(f"'{shown.name}' was deleted: undo, or remove the character with -.")
         if shown.name not in context.view_layer.objects or not shown.visible_get():
             raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
         created_ground.select(settings.scene_of(context), shown)

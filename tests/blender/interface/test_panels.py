@@ -175,6 +175,20 @@ def test_the_settings_of_ground_and_character_stand_in_the_physics_of_each(shot)
     assert pages() == {of_character}
     bpy.ops.mesh.primitive_cube_add()
     assert pages() == set()
+    delete(shot.softground.ground)
+    assert bpy.ops.softground.open_settings(of="GROUND") == {"FINISHED"}
+    assert bpy.context.active_object == walks
+    assert pages() == {of_character, of_ground}, "the ground is there no more"
+    delete(walks)
+    with pytest.raises(RuntimeError, match=f"'{walks.name}' was deleted: undo, or remove the character"):
+        bpy.ops.softground.open_settings(of="CHARACTER")
+
+
+def delete(obj):
+    """Delete an object as in the viewport: the settings still name it."""
+    bpy.ops.object.select_all(action="DESELECT")
+    obj.select_set(True)
+    bpy.ops.object.delete()
 
 
 def test_a_character_that_is_not_chosen_is_chosen_in_its_physics(shot):
