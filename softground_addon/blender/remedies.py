@@ -23,6 +23,7 @@ REMEDIES = {
     "edit_without_step": "The edit is kept for when the step comes back; Reset All Steps drops it.",
     "no_legs": "Complete its joints in Properties > Physics > Body Bones.",
     "carving": "Or turn Carve off, or raise Time Limit in Properties > Physics > Mesh and Look.",
+    "carving_memory": "Or turn Carve off.",
     "no_contact": "move the ground under the feet, or correct the feet in Properties > Physics > Contacts.",
     "below_ground": "move the ground down to them. If it is a room, turn its faces inward (Edit Mode, Mesh > Normals > "
     "Recalculate Inside).",

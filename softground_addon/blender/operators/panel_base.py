@@ -77,7 +77,7 @@ class GroundPanel(_PhysicsPanel):
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the active object is the ground, or the copy of it that takes the prints."""
         options = settings.options_of(context)
-        if options.ground is None:
+        if not settings.exists(options.ground):
             return belongs_to(chosen_of(options, "characters", "active_character"), context.object)
         return context.object in (options.ground, baked_ground.display_mesh_of(options.ground))
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty
@@ -238,21 +241,46 @@ class SOFTGROUND_OT_open_settings(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
         character, shown = active_character(options), None
-        if self.of == "GROUND" and options.ground is not None:
+        if self.of == "GROUND" and settings.exists(options.ground):
             shown = baked_ground.display_mesh_of(options.ground)
         elif character:  # a ground that is not there yet has its settings beside those of the character
             shown = settings.body_of(character)
         if shown is None:
             raise InputError("Add a character first")
+        if not settings.exists(shown):
+            raise InputError(f"'{shown.name}' was deleted: undo, or remove the character with -.")
         if shown.name not in context.view_layer.objects or not shown.visible_get():
             raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
         created_ground.select(settings.scene_of(context), shown)
-        editors = [area for area in context.screen.areas if area.type == "PROPERTIES"] if context.screen else []
-        for area in editors:
-            area.spaces.active.context = "PHYSICS"
-        if not editors:
+        if not context.screen or not show_physics(context.screen.areas):
             self.report({"INFO"}, translated("Its settings are in Properties > Physics"))
+            if context.screen and not bpy.app.background:
+                bpy.app.timers.register(partial(_show_physics_of, context.screen.name), first_interval=ONCE_DRAWN)
         return {"FINISHED"}
+
+
+ONCE_DRAWN = 0.2
+"""Time after which editors have been drawn with another active object [s]."""
+
+
+def show_physics(areas: Iterable[bpy.types.Area]) -> bool:
+    """Show Physics in the Properties editors that offer it; True if there is any.
+
+    One does not where other data is pinned, nor, until it is drawn again, where no object was active.
+    """
+    is_shown = False
+    for area in areas:
+        if area.type == "PROPERTIES":
+            space: Any = area.spaces.active
+            with suppress(TypeError):  # Blender's, for what is not offered
+                space.context = "PHYSICS"
+                is_shown = True
+    return is_shown
+
+
+def _show_physics_of(name: str) -> None:
+    if screen := bpy.data.screens.get(name):
+        show_physics(screen.areas)
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):

@@ -21,6 +21,7 @@ from ...core.rig.recording import SceneUnits
 from .. import mesh_arrays
 from ..carried import marks_nodes as nodes
 from ..carried import marks_object
+from ..placement import world_matrix
 
 NEAR = 0.01
 """Largest distance of a mark from the floor that it is on [m]."""
@@ -76,14 +77,15 @@ class FloorImage:
 def floor_images(
     marks: bpy.types.Object, floors: Iterable[bpy.types.Object], units: SceneUnits, resolution: int
 ) -> Iterator[FloorImage]:
-    """Images of marks, for each floor that has a UV map and some of them on it."""
+    """Images of marks, for each floor that has a UV map and some of them within its image."""
     mesh: bpy.types.Mesh = marks.data  # type: ignore[assignment]
-    quads = mesh_arrays.read_faces(mesh).corner_vertex.reshape(-1, 4)
-    triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    place = [marks.matrix_world @ Vector(at) for at in mesh_arrays.positions(mesh)]
+    triangles = mesh_arrays.triangles(mesh)
+    if not len(triangles):
+        return
+    place = _in_world(marks, mesh_arrays.positions(mesh))
     mass, birth, step = (marks_object.values(mesh, name) for name in (nodes.MASS, nodes.BIRTH, nodes.STEP))
     carried, step = np.stack([mass, birth], axis=-1)[triangles], step[triangles[:, 0]]
-    edges = np.linalg.norm(np.diff(np.array(place)[triangles], axis=1), axis=2).max(axis=1)
+    edges = np.linalg.norm(np.diff(place[triangles], axis=1), axis=2).max(axis=1)
     for floor in floors:
         uv = _uv_of(floor, place, NEAR / units.unit_scale_m)[triangles]
         size = np.linalg.norm(np.diff(uv, axis=1), axis=2).max(axis=1) / edges
@@ -96,23 +98,31 @@ def floor_images(
             for number in np.unique(step[whole])
             if (each := whole & (step == number)).any()
         ]
+        if not any(len(layer.index) for layer in layers):
+            continue
         index, pixel = np.unique(np.concatenate([layer.index for layer in layers]), return_inverse=True)
         mass, birth = np.concatenate([layer.position for layer in layers]).T
         yield FloorImage(floor.name, index, pixel, mass, birth, marks, units.frame_rate)
 
 
-def _uv_of(floor: bpy.types.Object, place: list[Vector], near: float) -> Array:
+def _in_world(obj: bpy.types.Object, place: Any) -> Array:
+    """Places (N, 3) of an object in the world, also before Blender has updated the object."""
+    matrix = world_matrix(obj)
+    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _uv_of(floor: bpy.types.Object, place: Array, near: float) -> Array:
     """Places (N, 2) in the UV map of a floor, NaN where it is not near [Blender units] or has none."""
     shown: Any = floor.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh, found = shown.to_mesh(), np.full((len(place), 2), np.nan)
     layer = next((each for each in mesh.uv_layers if each.active_render), None) if mesh else None
     if layer is not None:
         corners = [each.vector.to_3d() for each in layer.uv]
-        at: list[Any] = [floor.matrix_world @ vertex.co for vertex in mesh.vertices]
+        at: list[Any] = [Vector(vertex) for vertex in _in_world(floor, mesh_arrays.positions(mesh)).tolist()]
         mesh.calc_loop_triangles()
         triangles = [(tuple(each.vertices), tuple(each.loops)) for each in mesh.loop_triangles]
         tree = BVHTree.FromPolygons(at, [of_vertices for of_vertices, _ in triangles])
-        for number, point in enumerate(place):
+        for number, point in enumerate(place.tolist()):
             on, _, triangle, _ = tree.find_nearest(point, near)
             if on is not None:
                 of_vertices, of_corners = triangles[triangle]

@@ -145,13 +145,22 @@ def _shares(
 
 
 def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround) -> Slices[None]:
-    """Raise InputError if legs would carve the ground for longer, or more of it, than the bake may take."""
+    """Raise InputError if legs would carve the ground for longer, or more of it, than the bake may take.
+
+    What is too much without carving is refused as such.
+    """
+    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
     try:
         check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s)
     except InputError as error:  # if it is deep
         depths = (yield from pressed_contacts.slices(loads, ground, wanted.cell_size_m)).depths
         if wading(depths.max(initial=0.0), shortest_sole([character.motion for character in loads])) > 0:
-            raise InputError(f"Legs carve deep ground. {error}", "carving", remedy="Or do without carving.") from None
+            raise InputError(
+                f"Legs carve deep ground. {error}",
+                "carving" if error.code == "too_long" else "carving_memory",
+                remedy="Or do without carving.",
+                **error.facts,
+            ) from None
 
 
 def _edited(

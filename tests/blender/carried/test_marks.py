@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -111,13 +112,20 @@ def test_marks_dry_as_weather_dries_them(scene):
     assert 0 < np.mean(wet[mass > 0]) < 1
 
 
-def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene, tmp_path):
-    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+def with_uv_map(crate, scale=1.0):
+    """A UV map of the crate's top that fills the image, or a part of it; its sides are a point."""
     low, size = np.array(crate.bound_box).min(axis=0), np.array(crate.dimensions)
     layer = crate.data.uv_layers.new()
     for loop in crate.data.loops:
         x, y, z = np.array(crate.data.vertices[loop.vertex_index].co) - low
-        layer.uv[loop.index].vector = (x / size[0], y / size[1]) if z > size[2] / 2 else (0.0, 0.0)
+        top = scale * np.array((x / size[0], y / size[1]))
+        layer.uv[loop.index].vector = top if z > size[2] / 2 else (0.0, 0.0)
+
+
+def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene, tmp_path):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    size = np.array(crate.dimensions)
+    with_uv_map(crate)
     set_input(obj, "Drying", 0.5)
     set_input(obj, "Time Scale", 600.0)
     mesh = at(scene, 84)
@@ -138,6 +146,41 @@ def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene,
         scene, export_formats.Options("EXR", tmp_path / "shot.exr", 84, 84, 64, outdated=True)
     )
     assert (tmp_path / "shot_marks_Crate_0084.exr") in paths
+
+
+def test_images_have_marks_where_they_are_before_blender_has_updated_them(scene):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    with_uv_map(crate)
+    bpy.context.view_layer.update()
+    obj.location.z += 0.5
+    assert not list(mark_images.floor_images(obj, [crate], settings.units_of(scene), 64))
+    crate.location.z += 0.5
+    assert list(mark_images.floor_images(obj, [crate], settings.units_of(scene), 64))
+
+
+def test_a_floor_whose_uv_map_is_a_point_has_no_image_of_marks(scene):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    with_uv_map(crate, scale=0.0)
+    assert not list(mark_images.floor_images(obj, [crate], settings.units_of(scene), 64))
+
+
+def test_images_have_marks_whose_faces_the_user_has_split_or_deleted(scene):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    with_uv_map(crate)
+
+    def total():
+        images = mark_images.floor_images(obj, [crate], settings.units_of(scene), 256)
+        return sum(image.at(84)[:, 0].sum() for image in images)
+
+    before, faces = total(), bmesh.new()
+    faces.from_mesh(obj.data)
+    bmesh.ops.triangulate(faces, faces=faces.faces[:7])
+    faces.to_mesh(obj.data)
+    assert total() == pytest.approx(before, rel=0.05)
+    bmesh.ops.delete(faces, geom=faces.verts[:], context="VERTS")
+    faces.to_mesh(obj.data)
+    faces.free()
+    assert total() == 0.0
 
 
 def test_rain_keeps_marks_wet_and_washes_them_off(scene):

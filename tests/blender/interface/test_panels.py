@@ -17,7 +17,7 @@ import pytest
 from release import strings
 from softground_addon.blender import ground_presets, jobs, registration, session, settings, translation
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.operators import bake_result, modal_bake, prediction
+from softground_addon.blender.operators import bake_result, modal_bake, prediction, shot_setup
 from softground_addon.blender.panels import (
     ground_options_panel,
     panels,
@@ -175,6 +175,38 @@ def test_the_settings_of_ground_and_character_stand_in_the_physics_of_each(shot)
     assert pages() == {of_character}
     bpy.ops.mesh.primitive_cube_add()
     assert pages() == set()
+    delete(shot.softground.ground)
+    assert bpy.ops.softground.open_settings(of="GROUND") == {"FINISHED"}
+    assert bpy.context.active_object == walks
+    assert pages() == {of_character, of_ground}, "the ground is there no more"
+    delete(walks)
+    with pytest.raises(RuntimeError, match=f"'{walks.name}' was deleted: undo, or remove the character"):
+        bpy.ops.softground.open_settings(of="CHARACTER")
+
+
+class Pinned:
+    """A Properties editor that offers no Physics, as Blender refuses it."""
+
+    def __setattr__(self, name, value):
+        raise TypeError(f"bpy_struct: item.attr = val: enum \"{value}\" not found in ('TOOL', 'WORLD')")
+
+
+def test_an_editor_that_offers_no_physics_is_left_as_it_is():
+    def editor(kind, space):
+        return SimpleNamespace(type=kind, spaces=SimpleNamespace(active=space))
+
+    offers = SimpleNamespace(context="OBJECT")
+    pinned, viewport = editor("PROPERTIES", Pinned()), editor("VIEW_3D", SimpleNamespace())
+    assert not shot_setup.show_physics([pinned, viewport])
+    assert shot_setup.show_physics([pinned, editor("PROPERTIES", offers)])
+    assert offers.context == "PHYSICS"
+
+
+def delete(obj):
+    """Delete an object as in the viewport: the settings still name it."""
+    bpy.ops.object.select_all(action="DESELECT")
+    obj.select_set(True)
+    bpy.ops.object.delete()
 
 
 def test_a_character_that_is_not_chosen_is_chosen_in_its_physics(shot):

@@ -344,10 +344,23 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
 
 def test_a_bake_is_refused_that_carving_makes_too_long(scene, monkeypatch):
     walker(scene, **DEEP)
-    monkeypatch.setattr("softground_addon.core.loads.cell_limits.CARVED", 1e6)
+    limits = "softground_addon.core.loads.cell_limits"
+    monkeypatch.setattr(f"{limits}.CARVED", 1e6)
+    monkeypatch.setattr(f"{limits}.machine_memory", lambda: None)
     with pytest.raises(InputError, match=r"Legs carve deep ground\. .*Or do without carving") as caught:
         bake(scene)
-    assert "Or turn Carve off" in said(caught.value)
+    assert "Or turn Carve off, or raise Time Limit" in said(caught.value)
+    assert caught.value.facts["time"] > 3600.0
+    monkeypatch.setattr(f"{limits}.machine_memory", lambda: 1e10)
+    with pytest.raises(InputError, match="this machine has 10 GB") as caught:
+        bake(scene)
+    assert said(caught.value).endswith("Or turn Carve off.")
+    monkeypatch.setattr(f"{limits}.machine_memory", lambda: None)
+    monkeypatch.setattr(f"{limits}.SECONDS_AT_LEAST", 1e6)
+    with pytest.raises(InputError, match=r"^Cells of 1 cm would take") as caught:
+        bake(scene)
+    assert caught.value.code == "too_long"
+    monkeypatch.setattr(f"{limits}.SECONDS_AT_LEAST", 1.0)
     scene.softground.material.youngs_modulus = 10e6
     assert not bake(scene)[1].carves
 
