@@ -21,6 +21,7 @@ from ..baking.step_preview import StepPreview
 from ..ground import baked_ground, baked_steps
 from ..ground.baked_steps import BakedStep
 from ..placement import from_scene, in_scene
+from ..remedies import said
 from ..state import state
 from ..translation import translated
 from . import overlay
@@ -88,7 +89,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         try:
             return self._handle(context, event)
         except SoftGroundError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, said(error))
             return self._leave(context, {"CANCELLED"})
         except BaseException:
             self._leave(context, {"CANCELLED"})

@@ -36,6 +36,7 @@ from ..operators import show_prints
 from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..placement import from_scene
 from ..reading import analysis
+from ..remedies import said
 from ..translation import translated
 
 
@@ -246,7 +247,7 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         try:
             edit = self.chosen(settings.scene_of(context))[0].edit
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, said(error))
             return {"CANCELLED"}
         self.strength, self.move, self.turn = edit.strength, edit.move_m, radians(edit.turn_deg)
         self.scale, self.shift, self.sole = edit.scale, edit.shift_frames, edit.sole

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -61,10 +61,15 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         bears = np.where(touching.any(axis=1), max(RESTS * slow, LEAST_FRAMES), longest)  # or it brushes the ground
         absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
+    least = max(RESTS * slow, LEAST_FRAMES)
+    lengths = [sole.sole.length for sole in motion.soles]
+    marks = [sole.landmark_positions()[motion.on_frames, :, :2] for sole in motion.soles]
     for part in np.flatnonzero((owner < 0) & rests.any(axis=0)):
         yield
-        alone = rests[:, part] & ~_beside(character, skin.position[:, part, :2], touching)
-        absent |= _first(skin.bones[part] or motion.name, alone, max(RESTS * slow, LEAST_FRAMES))
+        alone = rests[:, part].copy()
+        if _first("", alone, least):  # which most parts that rest do not
+            alone[alone] = ~_beside(skin.position[alone, part, :2], marks, lengths, touching, alone)
+            absent |= _first(skin.bones[part] or motion.name, alone, least)
     findings = [*_doubled(character, skin.height)]
     for parts, code, what, remedy in (
         (absent, "skin_without_step", "rests on the ground without a print", "add what rests there to its contacts."),
@@ -106,12 +111,11 @@ def _still(skin: LowSkin, rests: Mask, rate: float) -> Mask:
     return np.minimum(before, after) < skin.calm
 
 
-def _beside(character: CharacterLoads, place: Array, touching: Mask) -> Mask:
-    """True while some sole touches within half its length of a place (F, 2), (F,)."""
+def _beside(place: Array, marks: Sequence[Array], lengths: Sequence[float], touching: Mask, frames: Mask) -> Mask:
+    """True while some sole touches within half its length of a place (N, 2) at N of the frames (F,), (N,)."""
     beside = np.zeros(len(place), dtype=bool)
-    for sole, on in zip(character.motion.soles, touching.T, strict=True):
-        marks = sole.landmark_positions()[character.motion.on_frames, :, :2]
-        beside |= on & (np.linalg.norm(marks - place[:, None], axis=-1).min(axis=1) < sole.sole.length / 2)
+    for of_sole, length, on in zip(marks, lengths, touching[frames].T, strict=True):
+        beside[on] |= np.linalg.norm(of_sole[frames][on] - place[on, None], axis=-1).min(axis=1) < length / 2
     return beside
 
 
