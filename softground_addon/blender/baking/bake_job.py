@@ -198,9 +198,11 @@ def _write_all(
     ]
     marks = [(each.made_with, each.marks) for each in prints]
     prints.clear()
-    if len(writing) > 1:
-        for waiting in filter(None, writing):
-            yield from until_ready(waiting)
+    for waiting in filter(None, writing):
+        yield from until_ready(waiting)
+    for made_with, _ in marks:  # or one of them would be written, and another one refused
+        if made_with.ground:
+            baked_ground.check_writable(settings.resolve(made_with.ground))
     for job, (made_with, its_marks) in zip(writing, marks, strict=True):
         if job is None:  # no step is on it
             assert made_with.ground

@@ -284,9 +284,12 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         grounds = settings.listed_grounds(scene.softground)
+        cleared = grounds[:1] if self.only_shown else grounds
+        for ground in filter(baked_ground.has_remains, cleared):  # all of them, or none
+            baked_ground.check_writable(ground)
         reuse.forget()
         with analysis.own_changes(scene):
-            for ground in grounds[:1] if self.only_shown else grounds:
+            for ground in cleared:
                 if baked_ground.has_remains(ground):
                     baked_ground.clear(ground)
                 look.take_off(ground)

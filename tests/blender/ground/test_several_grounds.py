@@ -13,6 +13,7 @@ from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
+from softground_addon.core.errors import InputError
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
@@ -416,3 +417,53 @@ def test_marks_and_hard_steps_beside_several_grounds_are_there_once(crate):
     assert all(row["surface"] != "hard" for row in baked_ground.events_of(item.object))
     assert len(marks_object.of(floor).data.polygons) + len(marks_object.of(crate).data.polygons) > 0
     assert report["totals"]["carried_kg"]["picked_up"] > 0
+
+
+def until_written(scene):
+    """A bake of two grounds that has worked all out, and has written nothing."""
+    job = bake_job.bake(scene)
+    ready = (progress for progress in job if progress is READY)
+    assert [next(ready), next(ready)] == [READY, READY]
+    return job
+
+
+def edit(obj):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def test_no_ground_is_written_where_another_one_cannot_be(crate):
+    scene = bpy.context.scene
+    also(crate)
+    job = until_written(scene)
+    edit(crate)
+    with pytest.raises(InputError, match="'Crate' is in Edit Mode"):
+        jobs.run(job)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    job = until_written(scene)
+    bpy.data.objects.remove(crate)
+    with pytest.raises(InputError, match="'Crate' was deleted"):
+        jobs.run(job)
+    assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_a_ground_that_goes_into_edit_mode_during_its_bake_is_refused_by_name(crate):
+    scene = bpy.context.scene
+    scene.softground.ground = plane(scene, size=9.0, vertices=4)
+    bpy.context.view_layer.update()
+    job = bake_job.bake(scene)
+    next(progress for progress in job if progress is READY)
+    edit(scene.softground.ground)
+    with pytest.raises(InputError, match="is in Edit Mode"):
+        jobs.run(job)
+
+
+def test_clear_that_is_refused_of_one_ground_clears_none(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    edit(baked_ground.display_mesh_of(crate))
+    assert "Edit Mode" in refusal(bpy.ops.softground.clear_bake)
+    assert all(map(baked_ground.is_baked, settings.grounds_of(scene.softground)))
