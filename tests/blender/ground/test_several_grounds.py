@@ -13,6 +13,7 @@ from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.weather import ground_weather
 from softground_addon.core.errors import InputError
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
@@ -467,3 +468,56 @@ def test_clear_that_is_refused_of_one_ground_clears_none(crate):
     edit(baked_ground.display_mesh_of(crate))
     assert "Edit Mode" in refusal(bpy.ops.softground.clear_bake)
     assert all(map(baked_ground.is_baked, settings.grounds_of(scene.softground)))
+
+
+def beside_a_far_field(crate):
+    """A first ground that nobody walks on; the floor under the walk is hard. The crate is the other ground."""
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    far = options.ground = plane(scene, size=9.0, vertices=4)
+    far.name, far.location.y = "Far", 30.0
+    also(crate)
+    options.hard_grounds.add().object = floor
+    options.marks = True
+    bpy.context.view_layer.update()
+    return scene
+
+
+def test_what_happens_on_hard_ground_is_with_the_first_ground_that_has_steps(crate):
+    scene = beside_a_far_field(crate)
+    options = scene.softground
+    options.characters[0].dirty_soles = 1.0
+    report = bake(scene).report
+    assert {row["ground"] for row in report["steps"]} == {CRATE}
+    assert "hard" in {row["surface"] for row in baked_ground.events_of(crate)}
+    assert report["totals"]["carried_kg"]["brought"] > 0
+    as_second = baked_ground.events_of(crate)
+    further_grounds.choose(options, options.grounds[0])
+    bake(scene)
+    assert baked_ground.events_of(crate) == as_second
+
+
+def test_edits_that_have_lost_their_step_stay_beside_a_ground_without_steps(crate):
+    scene = beside_a_far_field(crate)
+    lost = {"Walker/foot.L@900.0": StepEdit(mute=True)}
+    jobs.run(bake_job.bake(scene, edits=lost))
+    assert record_of(crate).edits == lost
+    bake(scene)
+    assert record_of(crate).edits == lost
+
+
+def test_weather_stays_on_a_ground_that_no_step_is_on_for_a_while(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    further_grounds.choose(scene.softground, item)
+    bpy.ops.softground.add_weather(preset=next(reversed(ground_weather.PRESETS)))
+    values = ground_weather.values_of(crate)
+    end = scene.softground.frame_end
+    scene.softground.frame_end = 14
+    assert {row["ground"] for row in bake(scene).report["steps"]} == {"Field"}
+    assert bake_report.stale_reasons(scene) == ()
+    scene.softground.frame_end = end
+    bake(scene)
+    assert len(prints_on(crate)) >= 2
+    assert ground_weather.values_of(crate) == values
