@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import further_grounds, jobs, preset_files, settings
+from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
@@ -521,3 +521,39 @@ def test_weather_stays_on_a_ground_that_no_step_is_on_for_a_while(crate):
     bake(scene)
     assert len(prints_on(crate)) >= 2
     assert ground_weather.values_of(crate) == values
+
+
+def test_use_selected_of_a_further_ground_brings_what_is_set_for_it(crate):
+    options, floor = bpy.context.scene.softground, bpy.context.scene.softground.ground
+    item = also(crate)
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("mud"))
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.context.view_layer.objects.active = crate
+    crate.select_set(True)
+    assert bpy.ops.softground.use_as_ground() == {"FINISHED"}
+    assert settings.listed_grounds(options) == [crate, floor]
+    assert (options.material.surface, item.material.surface) == ("mud", "snow")
+
+
+def test_a_ground_that_is_moved_makes_the_prediction_outdated(crate):
+    scene = bpy.context.scene
+    also(crate)
+    slab = scene.softground.hard_grounds.add().object = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    for obj in (crate, slab):
+        analysis.read(scene)
+        assert analysis.known(scene)
+        obj.location.z += 0.01
+        bpy.context.view_layer.update()
+        assert not analysis.known(scene)
+
+
+def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    assert baked_ground.display_mesh_of(crate) != crate
+    bpy.ops.softground.remove_ground()
+    (warning,) = bake(scene).report["warnings"]
+    assert "Press Add 'Crate'" in warning
