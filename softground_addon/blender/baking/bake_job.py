@@ -186,21 +186,23 @@ def _write_all(
 ) -> Job[tuple[list[Published | None], list[Finding]]]:
     """Put the prints on their grounds; what the scene shows is changed of all of them at once, in the last step.
 
-    Of several grounds, those without a print are as without a bake, and None is returned for them.
+    Of several grounds, those without a print and without weather are as without a bake, and None is returned for them.
     """
     published: list[Published | None] = []
     findings: list[Finding] = []
     writing = [
         write_prints(scene, each.made_with, part, each.record, each.debris, sole_length)
-        if each.record.footprints or len(prints) == 1
+        if each.record.footprints or len(prints) == 1 or _has_weather(each.made_with)
         else None
         for each, part in zip(prints, shot.of_each_ground, strict=True)
     ]
     marks = [(each.made_with, each.marks) for each in prints]
     prints.clear()
-    if len(writing) > 1:
-        for waiting in filter(None, writing):
-            yield from until_ready(waiting)
+    for waiting in filter(None, writing):
+        yield from until_ready(waiting)
+    for made_with, _ in marks:  # or one of them would be written, and another one refused
+        if made_with.ground:
+            baked_ground.check_writable(settings.resolve(made_with.ground))
     for job, (made_with, its_marks) in zip(writing, marks, strict=True):
         if job is None:  # no step is on it
             assert made_with.ground
@@ -213,6 +215,12 @@ def _write_all(
         published.append(on_ground)
         findings += of_ground
     return published, findings
+
+
+def _has_weather(made_with: BakeSettings) -> bool:
+    """True if weather is on the ground of the settings, which goes with a bake."""
+    ground = settings.find(made_with.ground) if made_with.ground else None
+    return ground is not None and bool(weather.values_of(ground))
 
 
 def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:

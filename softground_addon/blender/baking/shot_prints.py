@@ -11,7 +11,7 @@ from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.checks.volumes import check_volumes
-from ...core.composers.pressed_shot import PressedShot, loads_standing, offsets_mm, press_shot
+from ...core.composers.pressed_shot import PressedShot, first_with_steps, loads_standing, offsets_mm, press_shot
 from ...core.composers.responses import CharacterResponse, gap_table
 from ...core.debris.debris import Debris
 from ...core.events.events import Event, as_edited, events, in_order
@@ -152,7 +152,7 @@ def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str
 def _of_ground(
     shot: Shot, pressed: PressedShot, number: int, made_with: BakeSettings, part: Shot, ground: SoftGround
 ) -> Job[GroundPrints]:
-    """The prints of one of the grounds; the first has what happens elsewhere, and what soles bring from there.
+    """The prints of one of the grounds; the first with steps has what happens, and what soles bring, elsewhere.
 
     Raises BakeError if a footprint breaks an invariant.
     """
@@ -165,7 +165,8 @@ def _of_ground(
     throwing = with_debris.slices(record, ground, made_with, loads)
     record, debris = yield from meanwhile(at_end, throwing)
     brought = {character.name: character.dirty_soles for character in made_with.characters}
-    if number and isinstance(terrain, HardOnSoft):
+    has_the_rest = number == first_with_steps([each.footprints for each in pressed.records])
+    if not has_the_rest and isinstance(terrain, HardOnSoft):
         terrain, brought = replace(terrain, wet={}), {}
     marks = yield from meanwhile(
         at_end, marks_of_record.slices(record, terrain, made_with, loads, debris, brought=brought)
@@ -173,7 +174,7 @@ def _of_ground(
     first = made_with.frames[0]
     happening = events.slices(loads, record.footprints, surface=made_with.surface, first_frame=first)
     happened = yield from meanwhile(at_end, happening)
-    if number:
+    if not has_the_rest:
         happened = [row for row in happened if row["step"]]
     return GroundPrints(made_with, record, debris, marks, happened)
 

@@ -103,7 +103,7 @@ def _add_clean(clean: argparse.ArgumentParser) -> None:
     clean.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write a report of the feet, before and after, to this file"
     )
-    clean.set_defaults(preset=None, edits=None, receipt=None)
+    clean.set_defaults(preset=None, grounds=[], edits=None, receipt=None)
 
 
 def _add_export(export: argparse.ArgumentParser) -> None:

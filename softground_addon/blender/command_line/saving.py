@@ -13,11 +13,11 @@ from ...core.files import files
 
 
 def files_read(options: argparse.Namespace) -> list[Path]:
-    """The opened file, the files that it links, and the preset file."""
+    """The opened file, the files that it links, and the preset files."""
     linked = [(item.filepath, item.library) for item in (*bpy.data.libraries, *bpy.data.cache_files)]
     paths = [bpy.path.abspath(path, library=library) for path, library in linked]
-    if options.preset and options.preset.lower().endswith(".json"):
-        paths.append(options.preset)
+    presets = [options.preset or "", *(text.rpartition("=")[2] for text in options.grounds)]
+    paths += [preset for preset in presets if preset.lower().endswith(".json")]
     if options.edits:
         paths.append(str(options.edits))
     return [Path(os.path.realpath(path)) for path in (bpy.data.filepath, *paths) if path]

@@ -82,6 +82,12 @@ def has_remains(ground: bpy.types.Object) -> bool:
     return ground_mesh.has_remains(display_mesh_of(ground)) or hidden_ground.hides(ground)
 
 
+def check_writable(ground: bpy.types.Object) -> None:
+    """Raise InputError if the ground, or the copy that carries its bake, cannot be changed."""
+    for obj in dict.fromkeys((ground, display_mesh_of(ground))):
+        ground_checks.check_writable(obj)
+
+
 def clear(ground: bpy.types.Object) -> None:
     """Take the bake off the ground: it is what it was before, bit for bit. Without a bake nothing happens.
 
@@ -90,8 +96,7 @@ def clear(ground: bpy.types.Object) -> None:
     InputError
         If the ground or the copy that carries the bake cannot be changed.
     """
-    for obj in dict.fromkeys((ground, display_mesh_of(ground))):
-        ground_checks.check_writable(obj)
+    check_writable(ground)
     debris_object.remove(ground)
     marks_object.remove(ground)
     trampling_table.clear(ground)

@@ -313,11 +313,11 @@ def why_no_start(context: bpy.types.Context) -> str:
 
 
 def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
-    """Scene, ground, rigs, bodies and soles that a job reads: their names, by their identifiers in this session."""
+    """Scene, grounds, rigs, bodies and soles that a job reads: their names, by their identifiers in this session."""
     options = scene.softground
     soles = [sole.object for character in options.characters for sole in character.soles]
     rigs = [character.armature or character.body for character in options.characters]
-    return _named((scene, options.ground, *rigs, *soles))
+    return _named((scene, *settings.listed_grounds(options), *rigs, *soles))
 
 
 def _parts_of_bodies(options: Any) -> list[bpy.types.Object]:

@@ -16,7 +16,7 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import ground_presets, jobs, reuse, session, settings
+from .. import further_grounds, ground_presets, jobs, reuse, session, settings
 from ..animation_layer.constraint_layer import LayerKind
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
@@ -142,11 +142,16 @@ def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.J
     """Take a mesh as the ground, and read the shot for its prediction."""
     ground_checks.check_usable(chosen)
     options, before = scene.softground, scene.softground.ground
+    chosen_text = translated("'{name}' is now the ground", name=chosen.name)
+    if item := next((item for item in options.grounds if item.object == chosen and settings.exists(before)), None):
+        with analysis.own_changes(scene):
+            further_grounds.choose(options, item)  # with what is set for it; the first takes its place
+        return [("INFO", chosen_text)]
     name = settings.name_of(before) if before else None
     stays = False
     try:
         options.ground = chosen
-        reports: Reports = [("INFO", translated("'{name}' is now the ground", name=chosen.name))]
+        reports: Reports = [("INFO", chosen_text)]
         yield jobs.Progress("sample", 0.0)
         if options.characters:
             yield from _read_for_prediction(scene)
@@ -312,9 +317,12 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         grounds = settings.listed_grounds(scene.softground)
+        cleared = grounds[:1] if self.only_shown else grounds
+        for ground in filter(baked_ground.has_remains, cleared):  # all of them, or none
+            baked_ground.check_writable(ground)
         reuse.forget()
         with analysis.own_changes(scene):
-            for ground in grounds[:1] if self.only_shown else grounds:
+            for ground in cleared:
                 if baked_ground.has_remains(ground):
                     baked_ground.clear(ground)
                 look.take_off(ground)

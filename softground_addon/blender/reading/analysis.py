@@ -41,7 +41,7 @@ TRIALS = 3
 CLOSE_ENOUGH = 0.005
 """Relative error of a matched depth."""
 
-_Source = tuple[Mapping[str, Any], Any]
+_Source = tuple[Mapping[str, Any], Any, Any]
 """Settings that decide what is read of a shot, and where its ground lies."""
 
 
@@ -259,7 +259,8 @@ def _hash_of(scene: bpy.types.Scene) -> str:
 
 def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
     """Inputs of reading a shot that are in the settings; a handler notices other edits."""
-    return _parts(wanted)[0], ground and wanted.ground and _place(ground)
+    beside = [settings.find(name) for name in (*wanted.soft_grounds[1:], *wanted.hard_grounds)]
+    return _parts(wanted)[0], ground and wanted.ground and _place(ground), list(map(_place, filter(None, beside)))
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:

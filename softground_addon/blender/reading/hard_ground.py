@@ -19,7 +19,7 @@ from ...core.numerics.arrays import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from .. import settings
-from ..ground import ground_checks, ground_surface
+from ..ground import ground_checks, ground_surface, trail_detail
 from ..ground.baked_ground import display_mesh_of
 from ..placement import matrix_in
 from . import staleness
@@ -93,7 +93,7 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
     grounds = [settings.resolve(name) for name in wanted.soft_grounds]
     known = {settings.resolve(name) for name in wanted.hard_grounds} | set(staleness.bodies_of(scene.objects, wanted))
     known |= {*grounds, *map(display_mesh_of, grounds)}
-    still = []
+    still = dict[ObjectName, None]()
     for obj in scene.objects:
         if obj.type != "MESH" or obj in known or obj.hide_render or obj.display_type in ("WIRE", "BOUNDS"):
             continue
@@ -102,9 +102,10 @@ def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence
         world = matrix_in(wanted.frame, obj) if wanted.frame else np.array(obj.matrix_world)
         box = np.array(obj.bound_box) @ world[:3, :3].T + world[:3, 3]
         inside = (places > box.min(axis=0) - margin) & (places < box.max(axis=0) + margin)
-        if inside.all(axis=1).any() and not ground_checks.hard_fault(obj, next(iter(grounds), None)):
-            still.append(settings.name_of(obj))
-    return still
+        below = trail_detail.ground_of(obj)  # of the prints of a ground that is in the list no more
+        if inside.all(axis=1).any() and not ground_checks.hard_fault(below, next(iter(grounds), None)):
+            still[settings.name_of(below)] = None
+    return [*still]
 
 
 def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:

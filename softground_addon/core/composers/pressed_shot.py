@@ -169,17 +169,29 @@ def _edited(
     footprints: Sequence[Sequence[Footprint]],
     edits: Mapping[str, StepEdit],
 ) -> Slices[list[BakeRecord]]:
-    """The record of each ground, with the edits of its steps; the first has those whose steps no ground has."""
-    others = [name for of_ground in footprints[1:] for name in edits.keys() - without_step(of_ground, edits)]
+    """The record of each ground, with the edits of its steps; the first with steps has those whose steps no ground has.
+
+    A ground without steps gets no bake beside others that have some.
+    """
+    lacking_on = [{*without_step(of_ground, edits)} for of_ground in footprints]
+    keeper = first_with_steps(footprints)
+    elsewhere = {
+        name for number, lacking in enumerate(lacking_on) if number != keeper for name in edits.keys() - lacking
+    }
     records = []
     for number, (ground, of_ground) in enumerate(zip(grounds, footprints, strict=True)):
-        lacking = {*others} if number == 0 else {*without_step(of_ground, edits)}
+        lacking = elsewhere if number == keeper else lacking_on[number]
         its_edits = {name: edit for name, edit in edits.items() if name not in lacking}
         record = BakeRecord(of_ground, {})
         if its_edits:
             record = yield from with_edits.slices(record, its_edits, ground, wanted.cell_size_m)
         records.append(record)
     return records
+
+
+def first_with_steps(footprints: Sequence[Sequence[Footprint]]) -> int:
+    """Number of the first ground that has footprints; 0 where none has."""
+    return next((number for number, of_ground in enumerate(footprints) if of_ground), 0)
 
 
 def _pressed(

@@ -162,6 +162,7 @@ def test_bad_options_exit_with_2_and_say_what_to_do(shot, capfd, options, says):
         (("--dry-run", "--report", "shot.blend"), "is read by this bake"),
         (("--dry-run", "--receipt", "link.blend"), "is read by this bake"),
         (("--save", "rig.blend"), "is read by this bake"),
+        (("--dry-run", "--ground", "Floor=mud.json", "--report", "mud.json"), "is read by this bake"),
     ],
 )
 def test_no_result_is_written_over_another_or_over_what_is_read(scene, tmp_path, monkeypatch, capfd, options, says):
@@ -174,6 +175,7 @@ def test_no_result_is_written_over_another_or_over_what_is_read(scene, tmp_path,
     shot = tmp_path / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(shot))
     (tmp_path / "link.blend").symlink_to(shot)
+    (tmp_path / "mud.json").write_text("{}", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert run(shot, *options) == 2

@@ -6,13 +6,15 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import further_grounds, jobs, preset_files, settings
+from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.weather import ground_weather
+from softground_addon.core.errors import InputError
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
@@ -416,3 +418,142 @@ def test_marks_and_hard_steps_beside_several_grounds_are_there_once(crate):
     assert all(row["surface"] != "hard" for row in baked_ground.events_of(item.object))
     assert len(marks_object.of(floor).data.polygons) + len(marks_object.of(crate).data.polygons) > 0
     assert report["totals"]["carried_kg"]["picked_up"] > 0
+
+
+def until_written(scene):
+    """A bake of two grounds that has worked all out, and has written nothing."""
+    job = bake_job.bake(scene)
+    ready = (progress for progress in job if progress is READY)
+    assert [next(ready), next(ready)] == [READY, READY]
+    return job
+
+
+def edit(obj):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def test_no_ground_is_written_where_another_one_cannot_be(crate):
+    scene = bpy.context.scene
+    also(crate)
+    job = until_written(scene)
+    edit(crate)
+    with pytest.raises(InputError, match="'Crate' is in Edit Mode"):
+        jobs.run(job)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    job = until_written(scene)
+    bpy.data.objects.remove(crate)
+    with pytest.raises(InputError, match="'Crate' was deleted"):
+        jobs.run(job)
+    assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_a_ground_that_goes_into_edit_mode_during_its_bake_is_refused_by_name(crate):
+    scene = bpy.context.scene
+    scene.softground.ground = plane(scene, size=9.0, vertices=4)
+    bpy.context.view_layer.update()
+    job = bake_job.bake(scene)
+    next(progress for progress in job if progress is READY)
+    edit(scene.softground.ground)
+    with pytest.raises(InputError, match="is in Edit Mode"):
+        jobs.run(job)
+
+
+def test_clear_that_is_refused_of_one_ground_clears_none(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    edit(baked_ground.display_mesh_of(crate))
+    assert "Edit Mode" in refusal(bpy.ops.softground.clear_bake)
+    assert all(map(baked_ground.is_baked, settings.grounds_of(scene.softground)))
+
+
+def beside_a_far_field(crate):
+    """A first ground that nobody walks on; the floor under the walk is hard. The crate is the other ground."""
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    far = options.ground = plane(scene, size=9.0, vertices=4)
+    far.name, far.location.y = "Far", 30.0
+    also(crate)
+    options.hard_grounds.add().object = floor
+    options.marks = True
+    bpy.context.view_layer.update()
+    return scene
+
+
+def test_what_happens_on_hard_ground_is_with_the_first_ground_that_has_steps(crate):
+    scene = beside_a_far_field(crate)
+    options = scene.softground
+    options.characters[0].dirty_soles = 1.0
+    report = bake(scene).report
+    assert {row["ground"] for row in report["steps"]} == {CRATE}
+    assert "hard" in {row["surface"] for row in baked_ground.events_of(crate)}
+    assert report["totals"]["carried_kg"]["brought"] > 0
+    as_second = baked_ground.events_of(crate)
+    further_grounds.choose(options, options.grounds[0])
+    bake(scene)
+    assert baked_ground.events_of(crate) == as_second
+
+
+def test_edits_that_have_lost_their_step_stay_beside_a_ground_without_steps(crate):
+    scene = beside_a_far_field(crate)
+    lost = {"Walker/foot.L@900.0": StepEdit(mute=True)}
+    jobs.run(bake_job.bake(scene, edits=lost))
+    assert record_of(crate).edits == lost
+    bake(scene)
+    assert record_of(crate).edits == lost
+
+
+def test_weather_stays_on_a_ground_that_no_step_is_on_for_a_while(crate):
+    scene = bpy.context.scene
+    item = also(crate)
+    bake(scene)
+    further_grounds.choose(scene.softground, item)
+    bpy.ops.softground.add_weather(preset=next(reversed(ground_weather.PRESETS)))
+    values = ground_weather.values_of(crate)
+    end = scene.softground.frame_end
+    scene.softground.frame_end = 14
+    assert {row["ground"] for row in bake(scene).report["steps"]} == {"Field"}
+    assert bake_report.stale_reasons(scene) == ()
+    scene.softground.frame_end = end
+    bake(scene)
+    assert len(prints_on(crate)) >= 2
+    assert ground_weather.values_of(crate) == values
+
+
+def test_use_selected_of_a_further_ground_brings_what_is_set_for_it(crate):
+    options, floor = bpy.context.scene.softground, bpy.context.scene.softground.ground
+    item = also(crate)
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("mud"))
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.context.view_layer.objects.active = crate
+    crate.select_set(True)
+    assert bpy.ops.softground.use_as_ground() == {"FINISHED"}
+    assert settings.listed_grounds(options) == [crate, floor]
+    assert (options.material.surface, item.material.surface) == ("mud", "snow")
+
+
+def test_a_ground_that_is_moved_makes_the_prediction_outdated(crate):
+    scene = bpy.context.scene
+    also(crate)
+    slab = scene.softground.hard_grounds.add().object = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    for obj in (crate, slab):
+        analysis.read(scene)
+        assert analysis.known(scene)
+        obj.location.z += 0.01
+        bpy.context.view_layer.update()
+        assert not analysis.known(scene)
+
+
+def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    assert baked_ground.display_mesh_of(crate) != crate
+    bpy.ops.softground.remove_ground()
+    (warning,) = bake(scene).report["warnings"]
+    assert "Press Add 'Crate'" in warning
