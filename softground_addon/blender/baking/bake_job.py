@@ -43,6 +43,7 @@ from ..reading.shots import Shot, read_shot, settings_of
 from ..remedies import worded
 from ..response import response_job
 from ..weather import ground_weather as weather
+from ..weather.weather_keys import WeatherBefore
 from . import bake_report, step_soles
 from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
 from .publish import Published, at_the_end, publish, sign, until_ready
@@ -257,7 +258,7 @@ def write_prints(
     sole_length : float
         Of the shortest sole [m].
     """
-    weather_before = weather.values_of(settings.resolve(wanted.ground)) if wanted.ground else {}
+    weather_before = weather.before(settings.resolve(wanted.ground)) if wanted.ground else WeatherBefore()
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(record.shaping, **at_the_end(wanted))

@@ -27,6 +27,7 @@ from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
 from . import weather_keys
+from .weather_keys import WeatherBefore
 
 READING = jobs.Progress("sample", 0.5)
 
@@ -92,14 +93,21 @@ def values_of(ground: bpy.types.Object) -> dict[str, float]:
     return {} if modifier is None else weather_keys.values_of(modifier)
 
 
-def renew(ground: bpy.types.Object, values: Mapping[str, float], record: BakeRecord) -> None:
-    """Fit weather to the record of a new bake, with the values that the ground had before it, if it had weather."""
+def before(ground: bpy.types.Object) -> WeatherBefore:
+    """A ground's weather, for `renew`; without values if it has none."""
+    modifier = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    return WeatherBefore() if modifier is None else weather_keys.before(modifier)
+
+
+def renew(ground: bpy.types.Object, known: WeatherBefore, record: BakeRecord) -> None:
+    """Fit weather to the record of a new bake, with the values and keys that the ground had before it, if any."""
     existing = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
-    if existing is None and not values:
+    if existing is None and not known.values:
         return
     modifier = add(ground, record)
     if existing is None:
-        _set(modifier, values)
+        _set(modifier, known.values)
+        weather_keys.take_over(modifier, known)
 
 
 def set_preset(modifier: Any, preset: str) -> None:

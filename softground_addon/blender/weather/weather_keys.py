@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -77,6 +78,59 @@ def rates(modifier: Any, span: Span) -> dict[str, Any]:
         means = _means(keyed[name], span) if name in keyed else np.float64(typed(values[name]))
         means_by_field[field_of(name)] = (means.astype(np.float64) * unit).tolist()
     return {name: tuple(value) if isinstance(value, list) else value for name, value in means_by_field.items()}
+
+
+@dataclass(frozen=True)
+class WeatherBefore:
+    """Weather of a ground before a bake, by which it goes over to another mesh.
+
+    Attributes
+    ----------
+    values : mapping
+        What the sliders were at, by name.
+    modifier, action, slot : str
+        Names of the modifier and of the action that keyed it, and the identifier of its slot; empty without one.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    modifier: str = ""
+    action: str = ""
+    slot: str = ""
+
+
+def before(modifier: Any) -> WeatherBefore:
+    """The weather of a modifier, to be kept where the modifier is not."""
+    animation = modifier.id_data.animation_data
+    action = animation.action.name if animation and animation.action else ""
+    slot = getattr(compat.slot_of(animation), "identifier", "") if animation else ""
+    return WeatherBefore(values_of(modifier), modifier.name, action, slot)
+
+
+def take_over(modifier: Any, known: WeatherBefore) -> None:
+    """Key a modifier as the weather before it was keyed: by the action that its object plays, or else by a copy."""
+    owner = modifier.id_data
+    modifier.name = known.modifier
+    keyed: Any = bpy.data.actions.get(known.action)
+    paths = {compat.input_path(modifier, key) for key in weather_modifier.inputs_of(modifier).values()}
+    slot = _slot_named(keyed, known.slot)
+    if keyed and not _plays(owner) and paths & {curve.data_path for curve in compat.action_curves(keyed, slot)}:
+        animation = owner.animation_data or owner.animation_data_create()
+        animation.action = action = keyed.copy()
+        slot = _slot_named(action, known.slot)
+        compat.set_slot(animation, slot)
+        channels = compat.channels_of(action, slot)
+        for curve in [curve for curve in channels if curve.data_path not in paths]:
+            channels.remove(curve)
+    follow(owner)
+
+
+def _plays(owner: bpy.types.Object) -> bool:
+    return owner.animation_data is not None and owner.animation_data.action is not None
+
+
+def _slot_named(action: Any, identifier: str) -> Any:
+    """The slot of an action with an identifier; None where there is none."""
+    return next((slot for slot in getattr(action, "slots", ()) if slot.identifier == identifier), None)
 
 
 def is_keyed(modifier: Any, *names: str) -> bool:

@@ -746,3 +746,24 @@ def test_snow_that_cannot_lie_is_as_much_as_can_fall(opened, warm):
     scene.softground.snow_cm = 500.0
     assert weather.values_of(scene.softground.ground)["Snowfall"] == pytest.approx(weather_result.MOST_SNOW)
     assert 0.0 <= scene.softground.snow_cm < 500.0
+
+
+@pytest.mark.parametrize("detail", ["NEVER", "ALWAYS"])
+def test_keys_go_over_to_the_mesh_that_carries_the_next_bake(opened, detail):
+    scene = opened()
+    options = scene.softground
+    options.detail = "ALWAYS" if detail == "NEVER" else "NEVER"
+    bpy.ops.softground.bake()
+    first = carrier(scene)
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    weather_modifier.modifier_of(first).name = "Night"
+    key(scene, "Snowfall", {1: 0.0, 34: 5.0}, interpolation="CONSTANT")
+    options.detail = detail
+    bpy.ops.softground.bake()
+    assert carrier(scene) != first
+    modifier = weather_modifier.modifier_of(carrier(scene))
+    assert weather_keys.is_keyed(modifier, "Snowfall")
+    (curve,) = compat.action_curves(carrier(scene).animation_data.action)
+    assert curve.data_path == compat.input_path(modifier, weather_modifier.inputs_of(modifier)["Snowfall"])
+    assert [tuple(point.co) for point in curve.keyframe_points] == [(1.0, 0.0), (34.0, 5.0)]
+    assert {point.interpolation for point in curve.keyframe_points} == {"CONSTANT"}
