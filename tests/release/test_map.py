@@ -50,3 +50,12 @@ def test_the_first_row_shows_what_is_in_no_folder(half, folders):
 @pytest.mark.parametrize(("half", "folder"), FOLDERS)
 def test_a_folder_says_what_it_is_for(half, folder):
     assert (HALVES[half] / folder / "__init__.py").read_text(encoding="utf-8").startswith('"""')
+
+
+def test_stories_ask_for_modules_that_are_there():
+    """Real Blenders name the add-on otherwise, so that stories import its modules by their names."""
+    stories = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests/gui").rglob("*.py"))
+    names = set(re.findall(r'\bmodule\("([\w.]+)"\)', stories))
+    assert names
+    for name in names:
+        assert (HALVES["blender"] / f"{name.replace('.', '/')}.py").is_file(), name

@@ -38,7 +38,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
         facts["pressed"][name] = []
         for _ in range(2):
             yield from press(hand, name, facts["pressed"][name])
-    steps = module("operators.baked_steps")
+    steps = module("ground.baked_steps")
     for name in EDITING:
         session().step = steps.of(scene().softground.ground)[0].name
         facts["pressed"][name] = []

@@ -169,7 +169,7 @@ def strength_of(name: str) -> float:
 
 
 def steps() -> Any:
-    return module("operators.baked_steps").of(scene().softground.ground)
+    return module("ground.baked_steps").of(scene().softground.ground)
 
 
 def edits() -> dict:

@@ -101,7 +101,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 def prints_in_view(hand: Hand) -> list[tuple[float, float, float]]:
     """Place in the viewport, 0 to 1 across and up, and width of each print that is there [px]."""
     window, view = hand.region("WINDOW"), hand.area().spaces.active.region_3d
-    steps = module("operators.baked_steps")
+    steps = module("ground.baked_steps")
     places = []
     for step in steps.of(scene().softground.ground):
         corners = [location_3d_to_region_2d(window, view, point) for point in step.outline().tolist()]

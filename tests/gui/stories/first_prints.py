@@ -40,7 +40,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.wait_for(lambda: not session().is_baking, 120)
     facts["seconds in all"] = time.perf_counter() - started
     facts["last: shown"] = len(shown())
-    facts["steps"] = len(module("operators.baked_steps").of(scene.softground.ground))
+    facts["steps"] = len(module("ground.baked_steps").of(scene.softground.ground))
 
     content = fingerprints.of_file()
     module("reuse").forget()
