@@ -43,6 +43,16 @@ class OnShot:
         return bool(character_setup.characters_of(settings.options_of(context)))
 
 
+class OnGround:
+    """Operators that need a ground."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if the scene has a ground."""
+        cast("Any", cls).poll_message_set(translated("Choose a ground first, or bake one"))
+        return settings.exists(settings.options_of(context).ground)
+
+
 class OnBake:
     """Operators that need a bake on the ground."""
 

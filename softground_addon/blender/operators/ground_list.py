@@ -8,24 +8,18 @@ from bpy.props import StringProperty
 from ...core.errors import InputError
 from .. import further_grounds, settings
 from ..ground import ground_checks, trail_detail
-from ..operator_base import reports_errors
+from ..operator_base import OnGround, reports_errors
 from ..reading import analysis
 from ..translation import translated
 from .panel_base import chosen_of, remove_chosen
 
 
-class SOFTGROUND_OT_add_ground(bpy.types.Operator):
+class SOFTGROUND_OT_add_ground(OnGround, bpy.types.Operator):
     """Let the selected meshes take prints too, each by itself: crates, stairs, rocks beside the ground"""
 
     bl_idname = "softground.add_ground"
     bl_label = "Add Another Ground"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a first ground."""
-        cls.poll_message_set(translated("Choose a ground first, or bake one"))
-        return settings.exists(settings.options_of(context).ground)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -54,7 +48,7 @@ class SOFTGROUND_OT_remove_ground(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a ground is chosen in the list."""
+        """True if a ground is chosen in the list."""
         return chosen_of(settings.options_of(context), "grounds", "active_ground") is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:

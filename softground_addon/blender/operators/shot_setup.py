@@ -22,7 +22,7 @@ from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
-from ..operator_base import reports_errors
+from ..operator_base import OnGround, reports_errors
 from ..reading import analysis, shots
 from ..response import response_job
 from ..rigs import frame_ranges
@@ -335,18 +335,12 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_apply_look(bpy.types.Operator):
+class SOFTGROUND_OT_apply_look(OnGround, bpy.types.Operator):
     """Show the preset's look in the prints, over copies of your own materials. Clear Bake removes it"""
 
     bl_idname = "softground.apply_look"
     bl_label = "Apply Look"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is a ground."""
-        cls.poll_message_set(translated("Choose a ground first, or bake one"))
-        return settings.exists(settings.options_of(context).ground)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
