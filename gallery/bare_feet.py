@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import litter, open_air, seaside
 from sample_scenes import production, stage
 from sample_scenes.body import Body, Foot
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 
 CELL_SIZE = 0.002
@@ -52,24 +51,15 @@ def shore(y: Array) -> Array:
     return EDGE + 0.16 * np.sin(1.1 * y + 0.8) + 0.10 * np.sin(2.3 * y + 2.0) + 0.04 * np.sin(6.1 * y)
 
 
-@dataclass(frozen=True)
-class BareFeet:
-    """One long walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> BareFeet:
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide beach, and a walk along the water, away from the camera."""
     ground = open_air.add_ground(scene, "Beach", (-20.0, START + 3.0), height, "wet_sand")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.14, 2.06, 0.52), (-0.15, -0.06, 0.0), 28.0, (0.0, 1.0, 0.0), 14.0)
+    open_air.add_camera(scene, (0.14, 2.06, 0.52), (-0.15, -0.06, 0.0), 28.0, (0.0, 1.0, 0.0), 14.0, picture=PICTURE)
     chosen = PACKED | dict(options or {})
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, body=BODY)
-    return BareFeet({PRESET: bake})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, body=BODY)
 
 
-def claims(built: BareFeet) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """A track as deep as wet sand lets bare feet in."""
     steps = built.bakes[PRESET].footprints
     return [
@@ -91,7 +81,7 @@ def _add_pebbles() -> None:
         bpy.context.scene.collection.objects.link(pebble)
 
 
-def shoot(_built: BareFeet, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """Low over the sand, toward the sun over the sea."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import cos, pi, radians
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from gallery import firs, open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -34,23 +33,15 @@ STEP = 50
 QUALITY = 82
 
 
-@dataclass(frozen=True)
-class BeforeAfter:
-    """One walk, with its response as a layer that fades."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> BeforeAfter:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A walk past the camera, which is there first."""
     ground = open_air.add_ground(scene, "Snow", (-8.0, START + 3.0), HEIGHT, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.95, -1.80, 0.34), (0.02, -1.21, 0.10), 34.0, (0.06, -1.28, 0.0), 8.0)
+    open_air.add_camera(scene, (0.95, -1.80, 0.34), (0.02, -1.21, 0.10), 34.0, (0.06, -1.28, 0.0), 8.0, picture=PICTURE)
     chosen = {"relief_vertices": "400000", "material.youngs_modulus": SOFTER} | dict(options or {})
-    return BeforeAfter({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
 
 
-def claims(built: BeforeAfter) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Feet that float without the response stand with it."""
     gaps = {
         when: max(size["p95"] for size in built.bakes[PRESET].report["gaps_mm"][when]["Hiker"].values())
@@ -62,7 +53,7 @@ def claims(built: BeforeAfter) -> list[Claim]:
     ]
 
 
-def shoot(_built: BeforeAfter, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """The same frame without and with the layer, and the wipe between them."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(110), radians(11), (1.0, 0.80, 0.60), 7.0, 0.20, open_air.PALE_DUSK)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from gallery import firs, fur, open_air
 from sample_scenes import production, stage
 from sample_scenes.dog import Dog
 from sample_scenes.four_legged import WALK, go_on_four_legs
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 
 CELL_SIZE = 0.005
@@ -29,24 +28,15 @@ FIRS = 120
 HEIGHT = open_air.rolling(swell=0.2, hills=16.0, seed=9)
 
 
-@dataclass(frozen=True)
-class DogInSnow:
-    """One walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> DogInSnow:
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Built:
     """A snow field, and a dog across the picture."""
     ground = open_air.add_ground(scene, "Snow", (-6.0, START + 3.0), HEIGHT, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (2.5, -0.75, 0.72), (0.0, -0.12, 0.2), 38.0, (0.0, 0.0, 0.0), 11.0)
+    open_air.add_camera(scene, (2.5, -0.75, 0.72), (0.0, -0.12, 0.2), 38.0, (0.0, 0.0, 0.0), 11.0, picture=PICTURE)
     motion = go_on_four_legs(BODY, WALK, FRAMES, scene.render.fps)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, FIRM | dict(options or {}), motion, BODY)
-    return DogInSnow({PRESET: bake})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, FIRM | dict(options or {}), motion, BODY)
 
 
-def claims(built: DogInSnow) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Paws in the snow, and more of it carved by legs than pressed."""
     bake = built.bakes[PRESET]
     totals = bake.report["totals"]
@@ -57,7 +47,7 @@ def claims(built: DogInSnow) -> list[Claim]:
     ]
 
 
-def shoot(_built: DogInSnow, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the side, as high as the dog."""
     scene = bpy.context.scene
     scene.frame_set(MOMENT)

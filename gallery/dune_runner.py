@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.run import Run, run
 
 CELL_SIZE: float | None = None
@@ -29,23 +28,17 @@ PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.35, hills=9.0, seed=11)
 
 
-@dataclass(frozen=True)
-class DuneRunner:
-    """One run."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> DuneRunner:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide ground, and a run away from the camera."""
     ground = open_air.add_ground(scene, "Dunes", (-7.0, START + 3.0), HEIGHT, "sand")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.52, 0.18, 0.22), (-0.04, -0.66, 0.125), 34.0, (-0.04, -0.56, 0.0), 9.0)
+    open_air.add_camera(
+        scene, (0.52, 0.18, 0.22), (-0.04, -0.66, 0.125), 34.0, (-0.04, -0.56, 0.0), 9.0, picture=PICTURE
+    )
     motion = run(Body(), Run(speed=SPEED), FRAMES, scene.render.fps)
-    return DuneRunner({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options, motion)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options, motion)
 
 
-def claims(built: DuneRunner) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Steps as deep as a run makes them in dry sand, which throw some of it."""
     bake = built.bakes[PRESET]
     return [
@@ -55,7 +48,7 @@ def claims(built: DuneRunner) -> list[Claim]:
     ]
 
 
-def shoot(built: DuneRunner, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would lie in the sand, as the heel lifts, with the sun ahead."""
     scene = bpy.context.scene
     step, runner = built.bakes[PRESET].footprints[STEP], bpy.data.objects["Hiker"]

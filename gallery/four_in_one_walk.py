@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.materials import materials
@@ -39,14 +38,7 @@ def shifted(x: Array) -> Array:
     return 0.16 * np.sin(1.7 * x + 0.4) + 0.07 * np.sin(4.3 * x + 1.9) + 0.03 * np.sin(9.1 * x)
 
 
-@dataclass(frozen=True)
-class FourInOneWalk:
-    """One ground of four materials, and one walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> FourInOneWalk:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """Ground, walk, bake."""
     ground = open_air.add_ground(scene, "Pass", (-6.0, START + 2.0), _HILLS, "mud", spacing=SPACING)
     points = np.empty(len(ground.data.vertices) * 3, np.float32)
@@ -65,13 +57,12 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
         ground.data.materials.append(material)
     ground.data.polygons.foreach_set("material_index", slots.ravel())
     ground.data.update()
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.0, 2.75, 1.5), (-0.2, -0.95, 0.12), 29.0, (0.0, -0.3, 0.0), 11.0)
+    open_air.add_camera(scene, (1.0, 2.75, 1.5), (-0.2, -0.95, 0.12), 29.0, (0.0, -0.3, 0.0), 11.0, picture=PICTURE)
     chosen = {"relief_vertices": "400000"} | dict(options or {})
-    return FourInOneWalk({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
 
 
-def claims(built: FourInOneWalk) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Each material has prints of its own depth, and the rock has marks."""
     bake = built.bakes[PRESET]
     steps = {
@@ -93,7 +84,7 @@ def _depth(steps: list[Footprint]) -> float:
     return float(np.mean([step.compressed_m3 / step.area_m2 for step in steps]))
 
 
-def shoot(_built: FourInOneWalk, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """All four from behind, under a low sun from the side."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-155), radians(17), (1.0, 0.90, 0.78), 4.2, 0.4, open_air.PALE_DUSK)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi, radians
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from sample_scenes import production, stage
 from sample_scenes.course import Course
 from sample_scenes.dog import Dog
 from sample_scenes.four_legged import TROT, go_on_four_legs
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 
 CELL_SIZE = 0.002
@@ -69,25 +69,18 @@ WAY = Course(
 """Away from the camera, and then across the picture [m]."""
 
 
-@dataclass(frozen=True)
-class FoxInPowder:
-    """One trot."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> FoxInPowder:
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Built:
     """A snow field, and a fox that trots away from the camera and then across its view."""
     ground = open_air.add_ground(scene, "Powder", (-14.0, START + 3.0), _height, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (-0.03, 1.56, 0.30), (-0.31, -0.44, -0.24), 26.0, (0.05, 0.72, 0.0), 32.0)
+    open_air.add_camera(
+        scene, (-0.03, 1.56, 0.30), (-0.31, -0.44, -0.24), 26.0, (0.05, 0.72, 0.0), 32.0, picture=PICTURE
+    )
     motion = go_on_four_legs(BODY, GAIT, FRAMES, scene.render.fps, course=WAY)
     chosen = POWDER | dict(options or {})
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion, BODY)
-    return FoxInPowder({PRESET: bake})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion, BODY)
 
 
-def claims(built: FoxInPowder) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Prints as deep as paws are high, hind paws in those of forepaws."""
     steps = built.bakes[PRESET].footprints
     hind = np.array([step.position[:2] for step in steps if step.sole.startswith("foot")])
@@ -100,7 +93,7 @@ def claims(built: FoxInPowder) -> list[Claim]:
     ]
 
 
-def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From just above the snow, with the sun low at the left."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)

@@ -14,9 +14,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from gallery.moving_picture import put_together
-from gallery.time_lapse import CELL_SIZE, TimeLapse, hollow_left, light, take, track
+from gallery.time_lapse import CELL_SIZE, hollow_left, light, take, track
 from sample_scenes import production
-from sample_scenes.production import Claim, Options
+from sample_scenes.production import Built, Claim, Options
 
 __all__ = ["CELL_SIZE", "build", "claims", "shoot"]
 
@@ -34,17 +34,17 @@ LARGEST = 6_000_000
 _POINTER = np.array([(0, 0), (0, 16), (4, 12), (7, 18), (10, 17), (7, 11), (12, 11)])
 
 
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> TimeLapse:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """The track that is snowed in."""
-    return TimeLapse({WEATHER: track(scene, WEATHER, cell_size, options)})
+    return Built({WEATHER: track(scene, WEATHER, cell_size, options)})
 
 
-def claims(built: TimeLapse) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """The prints are gone in the morning."""
     return [Claim("Hollow left by a night of snow", hollow_left(built.bakes[WEATHER]), 0.0, 0.7)]
 
 
-def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """The window, and then the night."""
     shown = window(WINDOW)
     light(WEATHER)

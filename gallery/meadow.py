@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import broadleaf, open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.plants import meadow
@@ -30,28 +29,19 @@ TUFTS, NEAREST, FARTHEST = 42_000, 0.9, 26.0
 HEIGHT = open_air.rolling(swell=0.18, hills=18.0, seed=5)
 
 
-@dataclass(frozen=True)
-class Meadow:
-    """One long walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Meadow:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide ground, and a walk away from the camera."""
     ground = open_air.add_ground(scene, "Meadow", (-26.0, START + 3.0), HEIGHT, "soil", {"growth": _growth})
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, EYE, (-0.12, -2.2, 0.10), 30.0, (0.0, -0.9, 0.1), 16.0)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, {"relief": "OFF"} | dict(options or {}))
-    return Meadow({PRESET: bake})
+    open_air.add_camera(scene, EYE, (-0.12, -2.2, 0.10), 30.0, (0.0, -0.9, 0.1), 16.0, picture=PICTURE)
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, {"relief": "OFF"} | dict(options or {}))
 
 
-def claims(built: Meadow) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """A track under grass."""
     return [Claim("Steps in the meadow", len(built.bakes[PRESET].footprints), 10, 40)]
 
 
-def shoot(_built: Meadow, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the height of a child, against the evening sun."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(62), radians(13), (1.0, 0.74, 0.48), 10.0, 0.26, open_air.PALE_DUSK)

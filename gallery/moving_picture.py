@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -41,14 +40,7 @@ LARGEST = 1_800_000
 """More than this a README should not make its readers load [bytes]."""
 
 
-@dataclass(frozen=True)
-class MovingPicture:
-    """One walk through snow."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> MovingPicture:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A walk, with the camera behind: the ground reaches as far as that sees."""
     body = Body()
     walker = create_character("Hiker", body, scene.collection)
@@ -64,10 +56,10 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "800000"}
     chosen |= {"sink_feet": "true", "ground_margin": "3.0"} | dict(options or {})
     bake = production.bake(scene, [Walker(walker, body.mass)], PRESET, cell_size, options=chosen)
-    return MovingPicture({PRESET: bake})
+    return Built({PRESET: bake})
 
 
-def claims(built: MovingPicture) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """There is something to see."""
     steps = built.bakes[PRESET].footprints
     return [
@@ -76,7 +68,7 @@ def claims(built: MovingPicture) -> list[Claim]:
     ]
 
 
-def shoot(_built: MovingPicture, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """The frames, and the picture that they make."""
     scene, hiker = bpy.context.scene, bpy.data.objects["Hiker"]
     outfit.wear_boots(hiker, Body())

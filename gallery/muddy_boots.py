@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 
 from gallery import open_air, outfit
-from gallery.stone_floor import END, PICTURE, START, TOP, Crossing, booked, crossed, slab, stone
+from gallery.stone_floor import END, PICTURE, START, TOP, booked, crossed, slab, stone
 from sample_scenes import production, stage
 from sample_scenes.body import Body
 from sample_scenes.course import Course
 from sample_scenes.gait import Gait
-from sample_scenes.production import Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.carried import marks_object
 
@@ -36,7 +36,7 @@ def stairs() -> Array:
     return (along[FIRST - 1 : FIRST + STAIRS - 1] + along[FIRST : FIRST + STAIRS]) / 2 + 0.05  # toes reach ahead
 
 
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Crossing:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A floor of stone beside a muddy yard, a stair on it, and a walk over all of them."""
     edges, hard = stairs(), scene.softground.hard_grounds
     for number, along in enumerate(edges, 1):
@@ -46,7 +46,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     return crossed(scene, PRESET, "mud", CAMERA, FRAMES, cell_size, chosen, course=course)
 
 
-def claims(built: Crossing) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Each foot leaves less with each step, on the floor and on the stairs."""
     marks = marks_object.of(built.bakes[PRESET].ground)
     up = np.array([marks.matrix_world @ vertex.co for vertex in marks.data.vertices])[:, 2]
@@ -55,7 +55,7 @@ def claims(built: Crossing) -> list[Claim]:
     return [*booked(built, (5, 12), (10, 150)), Claim("Stairs with marks", float(on_stairs), 2, STAIRS)]
 
 
-def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """Floor and stair from behind, and one mark from above."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-150), radians(24), (1.0, 0.93, 0.84), 4.0, 0.35, open_air.PALE_DUSK)

@@ -17,7 +17,7 @@ from sample_scenes.dog import Dog
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
-from sample_scenes.production import Bake, Options, Walker
+from sample_scenes.production import Built, Options, Walker
 from sample_scenes.stage import Array
 from softground_addon.blender.nodes.shader_graph import Colour, Graph, Socket
 
@@ -102,7 +102,7 @@ def bake_walk(
     motion: BodyMotion | None = None,
     body: Body | Dog | None = None,
     beside: Sequence[Walker] = (),
-) -> Bake:
+) -> Built:
     """A hiker, or an animal, who goes along the way toward -y, from y = `start` [m], in prints for close-ups.
 
     A hiker walks, unless another `motion` of so many frames is given; others may print `beside` him. The camera is
@@ -121,7 +121,7 @@ def bake_walk(
     chosen |= dict(options or {})
     more = () if isinstance(body, Body) else ("hand.L", "hand.R")
     walkers = [Walker(walker, body.mass, more=more), *beside]
-    return production.bake(scene, walkers, preset, cell_size, ground=ground, options=chosen)
+    return Built({preset: production.bake(scene, walkers, preset, cell_size, ground=ground, options=chosen)})
 
 
 _SUN_WIDTH = radians(0.7)
@@ -225,9 +225,17 @@ def _mix_air(graph: Graph, shown: bpy.types.NodeSocket, air: bpy.types.Node, exp
 
 
 def add_camera(
-    scene: bpy.types.Scene, eye: ArrayLike, target: ArrayLike, lens: float, focus: ArrayLike, f_stop: float
+    scene: bpy.types.Scene,
+    eye: ArrayLike,
+    target: ArrayLike,
+    lens: float,
+    focus: ArrayLike,
+    f_stop: float,
+    picture: tuple[int, int] | None = None,
 ) -> bpy.types.Object:
-    """A camera that is sharp at `focus`."""
+    """A camera that is sharp at `focus`, with the size of the `picture` that it takes [pixels], if that is new."""
+    if picture:
+        scene.render.resolution_x, scene.render.resolution_y = picture
     camera = stage.add_camera(scene, "Camera", lens)
     stage.aim(camera, eye, target)
     camera.data.clip_end = 2 * FAR

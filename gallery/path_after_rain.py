@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from gallery import broadleaf, firs, litter, open_air
 from sample_scenes import production, stage
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
 from softground_addon.blender.ground import baked_ground
@@ -121,28 +120,20 @@ PAINTED = {
 """Pieces of a square metre, by kind."""
 
 
-@dataclass(frozen=True)
-class PathAfterRain:
-    """One long walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PathAfterRain:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide ground, a walk away from the camera, and a shower on its prints."""
     ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), height, "mud", PAINTED, SPACING)
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.28, 1.38, 0.40), (-0.05, -1.2, 0.02), 28.0, (0.05, 0.2, 0.0), 9.0)
+    open_air.add_camera(scene, (0.28, 1.38, 0.40), (-0.05, -1.2, 0.02), 28.0, (0.05, 0.2, 0.0), 9.0, picture=PICTURE)
     chosen = {"tread": "0.006", "relief_strength": "0.7"} | dict(options or {})
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
-    modifier = weather.add(bake.ground)
+    built = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
+    modifier = weather.add(built.bakes[PRESET].ground)
     weather.set_preset(modifier, "SHOWER")
     for name, value in {"Rain": RAIN, "Water Table": WATER_TABLE}.items():
         compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], value)
-    return PathAfterRain({PRESET: bake})
+    return built
 
 
-def claims(built: PathAfterRain) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """A track of the depth of boots in mud."""
     steps = built.bakes[PRESET].footprints
     return [
@@ -151,7 +142,7 @@ def claims(built: PathAfterRain) -> list[Claim]:
     ]
 
 
-def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, toward the evening sun that comes through the trees at the side."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import firs, open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.run import Run, run
 from softground_addon.blender.debris import debris_object
 
@@ -39,24 +38,16 @@ Place = tuple[float, float, float]
 """Beside the step [m]."""
 
 
-@dataclass(frozen=True)
-class PowderRunner:
-    """One run."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PowderRunner:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A snow field, and a run away from the camera."""
     ground = open_air.add_ground(scene, "Powder", (-7.0, START + 3.0), HEIGHT, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.54, 0.24, 0.32), (-0.04, -0.72, 0.115), 34.0, (0.0, -0.5, 0.0), 9.0)
+    open_air.add_camera(scene, (0.54, 0.24, 0.32), (-0.04, -0.72, 0.115), 34.0, (0.0, -0.5, 0.0), 9.0, picture=PICTURE)
     motion = run(Body(), Run(speed=SPEED), FRAMES, scene.render.fps)
     chosen = POWDER | dict(options or {})
-    return PowderRunner({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion)
 
 
-def claims(built: PowderRunner) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Steps ankle-deep, which throw nearly all that compaction leaves of what they press: 2·nu of it, a tenth."""
     bake = built.bakes[PRESET]
     totals = bake.report["totals"]
@@ -67,7 +58,7 @@ def claims(built: PowderRunner) -> list[Claim]:
     ]
 
 
-def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """From behind, as a boot leaves the snow; then its strike from ahead, with debris and without, above each other."""
     scene = bpy.context.scene
     bake = built.bakes[PRESET]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import firs, open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -25,23 +24,14 @@ FLAKES = 6000
 HEIGHT = open_air.rolling(swell=0.16, hills=26.0, seed=3)
 
 
-@dataclass(frozen=True)
-class SnowAtDusk:
-    """One long walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> SnowAtDusk:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide ground, and a walk away from the camera, which is there first: relief is fine where it comes near."""
     ground = open_air.add_ground(scene, "Snow Field", (-26.0, START + 3.0), HEIGHT, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.45, 1.75, 0.60), (-0.13, -1.5, 0.09), 28.0, (0.0, 0.1, 0.0), 8.0)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
-    return SnowAtDusk({PRESET: bake})
+    open_air.add_camera(scene, (0.45, 1.75, 0.60), (-0.13, -1.5, 0.09), 28.0, (0.0, 0.1, 0.0), 8.0, picture=PICTURE)
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
 
 
-def claims(built: SnowAtDusk) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """A track, as deep as snow lets a boot in."""
     steps = built.bakes[PRESET].footprints
     return [
@@ -50,7 +40,7 @@ def claims(built: SnowAtDusk) -> list[Claim]:
     ]
 
 
-def shoot(_built: SnowAtDusk, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would kneel beside the first steps."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from gallery import firs, muddy_boots, open_air, outfit
+from gallery import firs, open_air, outfit
+from gallery.stone_floor import slab
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
-from softground_addon.blender.shader_graph import Graph
+from sample_scenes.production import Built, Claim, Options
+from softground_addon.blender.nodes.shader_graph import Graph
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -28,18 +28,11 @@ PICTURE = (960, 600)
 _HILLS = open_air.rolling(swell=0.05, hills=22.0, seed=5)
 
 
-@dataclass(frozen=True)
-class SnowOnJetty:
-    """One walk on a jetty."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> SnowOnJetty:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A jetty over a frozen lake, its cover of snow, and a walk on it."""
     open_air.add_ground(scene, "Lake", (-26.0, START + 3.0), lambda x, y: _HILLS(x, y) - ABOVE, "snow", spacing=0.6)
     top, wood = -THICKNESS_CM / 100.0, _planks()
-    jetty = muddy_boots.slab(scene, "Jetty", (-9.0, START + 1.0), top, wood, HALF_WIDTH)
+    jetty = slab(scene, "Jetty", (-9.0, START + 1.0), top, wood, HALF_WIDTH)
     for side in (-1.0, 1.0):
         for along in np.arange(-8.0, START, 1.9):
             bpy.ops.mesh.primitive_cylinder_add(radius=0.07, depth=1.3, location=(side * 0.80, along, -0.42))
@@ -47,8 +40,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     bpy.context.view_layer.update()
     production.make_active(jetty)
     bpy.ops.softground.cover(thickness_cm=THICKNESS_CM)
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.6, 1.9, 0.95), (-0.16, -1.9, 0.16), 30.0, (0.0, -0.4, 0.0), 9.0)
+    open_air.add_camera(scene, (1.6, 1.9, 0.95), (-0.16, -1.9, 0.16), 30.0, (0.0, -0.4, 0.0), 9.0, picture=PICTURE)
     chosen = {
         "relief_vertices": "300000",
         "material.layer_depth": str(-top),
@@ -56,10 +48,10 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
         "material.youngs_modulus": "1.2e5",
     } | dict(options or {})
     ground = scene.softground.ground
-    return SnowOnJetty({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
 
 
-def claims(built: SnowOnJetty) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Prints, none of which goes through the snow."""
     steps = built.bakes[PRESET].footprints
     return [
@@ -68,7 +60,7 @@ def claims(built: SnowOnJetty) -> list[Claim]:
     ]
 
 
-def shoot(_built: SnowOnJetty, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From beside the jetty, with its edge in the low sun."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-128), radians(15), (1.0, 0.86, 0.70), 5.0, 0.3, open_air.PALE_DUSK)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -10,10 +9,10 @@ import bpy
 import numpy as np
 
 from gallery import open_air, outfit
-from gallery.muddy_boots import slab, stone
+from gallery.stone_floor import slab, stone
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from softground_addon.blender import settings
 from softground_addon.blender.ground import baked_ground
 
@@ -29,14 +28,7 @@ HALF_WIDTH, SNOW_CM = 0.8, 8.0
 PICTURE = (720, 480)
 
 
-@dataclass(frozen=True)
-class SnowedSteps:
-    """One walk over three grounds."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> SnowedSteps:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """Mud, two steps of stone that are covered with snow, and a walk up."""
     ground = open_air.add_ground(scene, "Yard", (-5.0, START + 2.0), open_air.rolling(0.0, 0.02, seed=5), "mud")
     scene.softground.ground = ground
@@ -44,13 +36,12 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     for number, (end, begin, top) in enumerate(STEPS, 1):
         production.make_active(slab(scene, f"Step {number}", (end, begin), top, stone(), HALF_WIDTH))
         bpy.ops.softground.cover(thickness_cm=SNOW_CM)
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.9, 1.55, 1.6), (-0.25, -1.25, 0.4), 27.0, (0.0, -0.6, 0.0), 11.0)
+    open_air.add_camera(scene, (1.9, 1.55, 1.6), (-0.25, -1.25, 0.4), 27.0, (0.0, -0.6, 0.0), 11.0, picture=PICTURE)
     chosen = {"relief_vertices": "120000"} | dict(options or {})
-    return SnowedSteps({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
 
 
-def claims(built: SnowedSteps) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Each ground has prints of its own, at its own height."""
     grounds = settings.grounds_of(bpy.context.scene.softground)
     prints = [baked_ground.record_of(ground).footprints for ground in grounds]
@@ -68,7 +59,7 @@ def claims(built: SnowedSteps) -> list[Claim]:
     ]
 
 
-def shoot(_built: SnowedSteps, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """The steps from behind, under a low sun from the side."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-155), radians(19), (1.0, 0.90, 0.78), 4.2, 0.4, open_air.PALE_DUSK)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
 import numpy as np
 
@@ -12,7 +10,7 @@ from sample_scenes import stage
 from sample_scenes.body import Body
 from sample_scenes.course import Course
 from sample_scenes.gait import Gait, walk
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from sample_scenes.stage import Array
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.nodes.shader_graph import Graph
@@ -24,13 +22,6 @@ TOP, BELOW = 0.004, 0.06
 """Height of the floor, and how deep the soft ground lies beneath it [m]."""
 PICTURE = (960, 640)
 _HILLS = open_air.rolling(swell=0.12, hills=8.0, seed=4)
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """One walk over both."""
-
-    bakes: dict[str, Bake]
 
 
 def height(x: Array, y: Array) -> Array:
@@ -50,21 +41,19 @@ def crossed(
     *,
     body: Body | None = None,
     course: Course | None = None,
-) -> Crossing:
+) -> Built:
     """A yard with a floor, on which other slabs may lie already, and a walk over it that a camera sees."""
     ground = open_air.add_ground(scene, "Yard", (-3.0, START + 2.0), height, surface)
     scene.softground.hard_grounds.add().object = slab(scene, "Floor", (END, EDGE), TOP, stone())
     bpy.context.view_layer.update()
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
     eye, target, lens = camera
-    open_air.add_camera(scene, eye, target, lens, target, 11.0)
+    open_air.add_camera(scene, eye, target, lens, target, 11.0, picture=PICTURE)
     body = body or Body()
     motion = walk(body, Gait(), frames, scene.render.fps, course=course) if course else None
-    bake = open_air.bake_walk(scene, ground, START, frames, preset, cell_size, options, motion, body)
-    return Crossing({preset: bake})
+    return open_air.bake_walk(scene, ground, START, frames, preset, cell_size, options, motion, body)
 
 
-def booked(built: Crossing, marks: tuple[int, int], grams: tuple[float, float]) -> list[Claim]:
+def booked(built: Built, marks: tuple[int, int], grams: tuple[float, float]) -> list[Claim]:
     """How many steps leave marks, what these weigh, and that all which is picked up is booked."""
     (bake,) = built.bakes.values()
     carried, obj = bake.report["totals"]["carried_kg"], marks_object.of(bake.ground)

@@ -6,7 +6,6 @@ One bake each; only the weather's sliders act afterwards.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Bake, Built, Claim, Options, Walker
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
 from softground_addon.blender.playback import weather_modifier
@@ -73,16 +72,9 @@ APART = 30.0
 """Distance of the tracks [m]."""
 
 
-@dataclass(frozen=True)
-class TimeLapse:
-    """A track on each ground, by the preset of its weather."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> TimeLapse:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """The same walk on each ground, far from the others."""
-    return TimeLapse({preset: track(scene, preset, cell_size, options) for preset in WEATHER})
+    return Built({preset: track(scene, preset, cell_size, options) for preset in WEATHER})
 
 
 def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options: Options | None) -> Bake:
@@ -139,7 +131,7 @@ def _set_in(modifier: Any, frame: int) -> None:
     weather_keys.follow(modifier.id_data)
 
 
-def claims(built: TimeLapse) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """What the weather does to the hollow of a step, from the end of the walk to the last picture."""
     shares = {preset: hollow_left(bake) for preset, bake in built.bakes.items()}
     return [
@@ -172,7 +164,7 @@ def _hollow(bake: Bake, frame: int) -> float:
     return float(np.median(places[(away > 0.3) & (away < 0.6), 2]) - np.median(places[away < 0.04, 2]))
 
 
-def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """Four moments of each."""
     made = []
     for preset, bake in built.bakes.items():
@@ -185,7 +177,7 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     return made
 
 
-def _show(built: TimeLapse, presets: Collection[str]) -> None:
+def _show(built: Built, presets: Collection[str]) -> None:
     """Only the tracks under these presets: the weather of the others need not be computed."""
     for preset, bake in built.bakes.items():
         bake.display_mesh.hide_viewport = bake.display_mesh.hide_render = preset not in presets

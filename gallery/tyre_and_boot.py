@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from gallery.tyre import RADIUS, create_tyre
 from sample_scenes import production, stage
 from sample_scenes.course import Course, Heights
 from sample_scenes.curves import clamped_spline
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from sample_scenes.rolling_things import roll_along
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
@@ -129,18 +128,10 @@ PAINTED = {
 }
 
 
-@dataclass(frozen=True)
-class TyreAndBoot:
-    """A car's wheels, and one long walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> TyreAndBoot:
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Built:
     """A wide ground, four wheels that roll along it in two ruts, and a walk after them."""
     ground = open_air.add_ground(scene, "Track", (-20.0, START + 3.0), HEIGHT, "soil", PAINTED)
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.34, 1.42, 0.40), (-0.10, -1.4, 0.06), 28.0, (0.05, 0.1, 0.0), 9.0)
+    open_air.add_camera(scene, (0.34, 1.42, 0.40), (-0.10, -1.4, 0.06), 28.0, (0.05, 0.1, 0.0), 9.0, picture=PICTURE)
     along = np.linspace(0.0, 26.0, 53)
     car = []
     for rut in RUTS:
@@ -152,12 +143,12 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
             roll_along(wheel, course, RADIUS, SPEED, FRAMES, scene.render.fps, 1 + AXLES * axle)
             car.append(Walker(wheel, MASS / 4))
     chosen = {"relief_strength": "1.4", "tread": "0.006"} | dict(options or {})
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, beside=car)
-    modifier = weather.add(bake.ground)
+    built = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, beside=car)
+    modifier = weather.add(built.bakes[PRESET].ground)
     weather.set_preset(modifier, "SHOWER")
     for name, value in {"Rain": RAIN, "Water Table": WATER_TABLE}.items():
         compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], value)
-    return TyreAndBoot({PRESET: bake})
+    return built
 
 
 def _under(rut: float) -> Heights:
@@ -165,7 +156,7 @@ def _under(rut: float) -> Heights:
     return lambda along, aside: HEIGHT(rut + aside, START + 0.4 - along)
 
 
-def claims(built: TyreAndBoot) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Prints of both kinds, of depths that wet soil takes."""
     bake = built.bakes[PRESET]
     boots, tyres = bake.of("Hiker"), [step for step in bake.footprints if step.character != "Hiker"]
@@ -176,7 +167,7 @@ def claims(built: TyreAndBoot) -> list[Claim]:
     ]
 
 
-def shoot(_built: TyreAndBoot, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, toward the evening sun at the side."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)

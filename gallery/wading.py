@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from gallery import firs, open_air, outfit
 from sample_scenes import production, stage
 from sample_scenes.body import Body
-from sample_scenes.production import Bake, Claim, Options
+from sample_scenes.production import Bake, Built, Claim, Options
 
 CELL_SIZE = 0.005
 """Walls of a trench are seen from near [m]."""
@@ -27,23 +26,14 @@ BOUNCES = 8
 HEIGHT = open_air.rolling(swell=0.2, hills=18.0, seed=5)
 
 
-@dataclass(frozen=True)
-class Wading:
-    """One walk."""
-
-    bakes: dict[str, Bake]
-
-
-def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Wading:
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Built:
     """A snow field, and a walk across the picture."""
     ground = open_air.add_ground(scene, "Powder", (-7.0, START + 3.0), HEIGHT, "snow")
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (3.3, -0.55, 0.85), (0.0, 0.35, 0.42), 35.0, (0.0, 0.2, 0.0), 11.0)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
-    return Wading({PRESET: bake})
+    open_air.add_camera(scene, (3.3, -0.55, 0.85), (0.0, 0.35, 0.42), 35.0, (0.0, 0.2, 0.0), 11.0, picture=PICTURE)
+    return open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
 
 
-def claims(built: Wading) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """Steps to the knees, and walls that are no steps of a stair."""
     bake = built.bakes[PRESET]
     return [
@@ -58,7 +48,7 @@ def _carved(bake: Bake) -> float:
     return float(totals.get("carved_m3", 0.0) / totals["compressed_m3"])
 
 
-def shoot(_built: Wading, folder: Path, samples: int) -> list[Path]:
+def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the side, as high as the hips; then from above, along the trench."""
     scene = bpy.context.scene
     scene.frame_set(MOMENT)

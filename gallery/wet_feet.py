@@ -8,10 +8,10 @@ from pathlib import Path
 import bpy
 
 from gallery import open_air
-from gallery.stone_floor import PICTURE, TOP, Crossing, booked, crossed, slab
+from gallery.stone_floor import PICTURE, TOP, booked, crossed, slab
 from sample_scenes import production, stage
 from sample_scenes.body import Body, Foot
-from sample_scenes.production import Claim, Options
+from sample_scenes.production import Built, Claim, Options
 from softground_addon.blender import compat
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.nodes.node_modifiers import inputs_of
@@ -31,7 +31,7 @@ CAMERA = (0.55, -1.1, 0.85), (-0.02, -2.15, 0.0), 28.0
 """Where it is and looks [m], and its lens [mm]."""
 
 
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Crossing:
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Built:
     """A terrace beside dry soil, a puddle on it, and a walk over both."""
     puddle = scene.softground.hard_grounds.add()
     puddle.object = slab(scene, "Puddle", PUDDLE, TOP + DEEP, _water(), HALF_WIDTH)
@@ -40,12 +40,12 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     return crossed(scene, PRESET, "soil", CAMERA, FRAMES, cell_size, chosen, body=BODY)
 
 
-def claims(built: Crossing) -> list[Claim]:
+def claims(built: Built) -> list[Claim]:
     """What the feet took up is left or still on them."""
     return booked(built, (4, 9), (0.5, 8.0))
 
 
-def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
+def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """The terrace from behind with the sun ahead, at three times beside each other."""
     scene = bpy.context.scene
     open_air.add_low_sun(scene, radians(-150), radians(24), (1.0, 0.93, 0.84), 4.0, 0.35, open_air.PALE_DUSK)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sample_scenes import plates, production, stage
 from sample_scenes.course import Course
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.core.record.footprints import recompose
 
 CELL_SIZE = 0.006  # m
@@ -23,10 +23,9 @@ WAY = ((0.0, 0.0), (1.6, 0.0), (2.8, 0.35), (4.2, 1.3))  # m
 
 
 @dataclass(frozen=True)
-class Bicycle:
+class Bicycle(Built):
     """The bake and the wheels, the front one first."""
 
-    bakes: dict[str, Bake]
     wheels: list[bpy.types.Object]
     course: Course
 

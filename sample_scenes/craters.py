@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from sample_scenes import plates, production, stage, terrain
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.01  # m
@@ -36,10 +36,9 @@ NAMES = {"mass": "{:g} kg".format, "modulus": lambda pa: f"{pa / 1e6:g} MPa", "p
 
 
 @dataclass(frozen=True)
-class Craters:
+class Craters(Built):
     """One bake, and the print of each sphere by what is varied and its value."""
 
-    bakes: dict[str, Bake]
     spheres: dict[tuple[str, float], bpy.types.Object]
 
     def crater(self, row: str, value: float) -> Footprint:

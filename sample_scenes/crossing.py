@@ -15,7 +15,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Bake, Built, Claim, Options, Walker
 from softground_addon.core.ground.heightfield import HeightField
 from softground_addon.core.record.footprints import Footprint, recompose
 
@@ -24,10 +24,9 @@ FRAMES = 84  # 3.5 s
 
 
 @dataclass(frozen=True)
-class Crossing:
+class Crossing(Built):
     """One ground with the tracks of two walkers, and what each does to it alone."""
 
-    bakes: dict[str, Bake]
     alone: list[Bake]
     walkers: list[bpy.types.Object]
 

@@ -17,7 +17,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.viewport import overlay_shapes
 from softground_addon.core.loads.estimate import CharacterLoads
@@ -30,10 +30,9 @@ COLOURS = {"weight": (0.85, 0.30, 0.03), "momentum": (0.03, 0.22, 0.85), "total"
 
 
 @dataclass(frozen=True)
-class ForceArrows:
+class ForceArrows(Built):
     """A walk, its bake, and the forces on its soles at the steps of the simulation."""
 
-    bakes: dict[str, Bake]
     walker: bpy.types.Object
     loads: CharacterLoads
 

@@ -19,7 +19,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.core.record.footprints import Footprint
 
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
@@ -39,10 +39,9 @@ EXPOSURE = {"Snow": -0.6, "Dry Sand": -0.25, "Mud": 0.25, "Soil": 0.6}
 
 
 @dataclass(frozen=True)
-class FourGrounds:
+class FourGrounds(Built):
     """One bake per preset, and who walked there."""
 
-    bakes: dict[str, Bake]
     walkers: list[bpy.types.Object]
 
 

@@ -14,7 +14,7 @@ from sample_scenes.character import create_character
 from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.four_legged import TROT, WALK, go_on_four_legs
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.blender.reading import analysis
 from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.record.footprints import Footprint
@@ -29,10 +29,9 @@ APART = 0.9  # m between their ways
 
 
 @dataclass(frozen=True)
-class FourLegs:
+class FourLegs(Built):
     """Two dogs on one ground, and the loads of each."""
 
-    bakes: dict[str, Bake]
     dogs: dict[str, bpy.types.Object]
     loads: dict[str, CharacterLoads]
 

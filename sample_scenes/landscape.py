@@ -19,7 +19,7 @@ from sample_scenes.course import Course
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from sample_scenes.run import Run, run
 from sample_scenes.snowshoe import ON_SNOWSHOES, put_on_snowshoes
 from softground_addon.blender.materials import materials
@@ -51,10 +51,9 @@ _LIGHT = Body(stature=1.05, mass=9.0, foot=Foot(0.13, 0.055))
 
 
 @dataclass(frozen=True)
-class Landscape:
+class Landscape(Built):
     """One ground with five tracks."""
 
-    bakes: dict[str, Bake]
     walkers: dict[str, bpy.types.Object]
 
 

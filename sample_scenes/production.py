@@ -128,6 +128,18 @@ class Bake:
         return tuple(step for step in self.footprints if step.character == name)
 
 
+@dataclass(frozen=True)
+class Built:
+    """A scene that is built: its bakes, mostly by their presets; scenes with more to measure add it.
+
+    Attributes
+    ----------
+    bakes : dict of str to Bake
+    """
+
+    bakes: dict[str, Bake]
+
+
 @contextmanager
 def addon() -> Iterator[None]:
     """An empty file with SoftGround switched on; off again at the end, or the bpy module would hang on exit."""

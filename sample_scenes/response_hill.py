@@ -14,7 +14,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 
 CELL_SIZE = 0.025  # m
 FRAMES = 96  # 4 s
@@ -27,10 +27,9 @@ _RESPONSE: Options = {"tilt.use": "true", "tilt.strength": "0.8", "grounding.use
 
 
 @dataclass(frozen=True)
-class ResponseHill:
+class ResponseHill(Built):
     """The walk without and with the response, each on its own hill."""
 
-    bakes: dict[str, Bake]
     walkers: dict[str, bpy.types.Object]
 
 

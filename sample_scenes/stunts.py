@@ -13,7 +13,7 @@ from sample_scenes.body import Body
 from sample_scenes.cartwheel import cartwheel
 from sample_scenes.character import copy_character, create_character
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from sample_scenes.showpieces import dance, kick
 from softground_addon.blender.reading import analysis
 from softground_addon.core.loads.estimate import CharacterLoads
@@ -28,10 +28,9 @@ HANDS = ("hand.L", "hand.R")
 
 
 @dataclass(frozen=True)
-class Stunts:
+class Stunts(Built):
     """One ground under three performers, and the loads of each."""
 
-    bakes: dict[str, Bake]
     performers: dict[str, bpy.types.Object]
     loads: dict[str, CharacterLoads]
 

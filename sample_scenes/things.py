@@ -17,7 +17,7 @@ from sample_scenes.fall import LIMBS, fall_back
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import object_curves, write_action, write_curve
 from sample_scenes.plain_objects import BOX, Look, add_object, box_corners
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from sample_scenes.rolling_things import create_ball, drop, write_poses
 from sample_scenes.snowshoe import snowshoe_mesh
 from softground_addon.blender.reading import analysis
@@ -46,10 +46,9 @@ PLACES = {
 
 
 @dataclass(frozen=True)
-class Things:
+class Things(Built):
     """One ground, who and what was on it, and their loads."""
 
-    bakes: dict[str, Bake]
     things: dict[str, bpy.types.Object]
     loads: dict[str, CharacterLoads]
 

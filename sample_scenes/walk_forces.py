@@ -15,7 +15,7 @@ from sample_scenes.character import create_character
 from sample_scenes.force_arrows import whole_strides
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.production import Built, Claim, Options, Walker
 from softground_addon.blender.reading import analysis
 from softground_addon.core.loads.estimate import CharacterLoads
 
@@ -29,10 +29,9 @@ SPEED = 1.65  # m/s
 
 
 @dataclass(frozen=True)
-class WalkForces:
+class WalkForces(Built):
     """The walk's bake, and its forces from each model."""
 
-    bakes: dict[str, Bake]
     loads: dict[str, CharacterLoads]
 
 

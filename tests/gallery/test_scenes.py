@@ -32,6 +32,11 @@ def test_volumes_are_kept_with_relief_and_every_option_on(addon, scene):
     promises.keeps_the_invariants(import_module("gallery.relief"), scene)
 
 
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "gallery").glob("*.py")))
+def test_every_module_finds_what_it_imports(name):
+    import_module(f"gallery.{name}")
+
+
 def test_every_scene_is_shown_with_its_command():
     shown = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
     modules = [f"sample_scenes.{name}" for name in SCENES] + [f"gallery.{name}" for name in ("relief", *HEROES)]
