@@ -18,7 +18,7 @@ from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
 from ..translation import translated
 from .modal_job import Reading, Reports
-from .panel_base import chosen_of, remove_chosen
+from .panel_base import RemovesChosen, chosen_of
 
 
 def active_character(options: Any) -> Any:
@@ -64,16 +64,12 @@ class _OnCharacter:
         return True
 
 
-class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
+class SOFTGROUND_OT_remove_character(RemovesChosen):
     """Remove the character from the list; its armature and the ground stay as they are"""
 
     bl_idname = "softground.remove_character"
     bl_label = "Remove Character"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        remove_chosen(settings.options_of(context), "characters", "active_character")
-        return {"FINISHED"}
+    of_list = ("characters", "active_character")
 
 
 MUCH = 2.0
@@ -216,23 +212,13 @@ class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
+class SOFTGROUND_OT_remove_sole(RemovesChosen):
     """Remove the selected contact from the list: it leaves no prints"""
 
     bl_idname = "softground.remove_sole"
     bl_label = "Remove Contact"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if active_sole(settings.options_of(context)) is None:
-            cls.poll_message_set(translated("Select a contact in the list first"))
-            return False
-        return True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        remove_chosen(active_character(settings.options_of(context)), "soles", "active_sole")
-        return {"FINISHED"}
+    of_list = ("soles", "active_sole")
+    owner = staticmethod(active_character)
 
 
 CLASSES = (

@@ -11,7 +11,7 @@ from ..ground import ground_checks, trail_detail
 from ..operator_base import OnGround, reports_errors
 from ..reading import analysis
 from ..translation import translated
-from .panel_base import chosen_of, remove_chosen
+from .panel_base import RemovesChosen, chosen_of
 
 
 class SOFTGROUND_OT_add_ground(OnGround, bpy.types.Operator):
@@ -39,21 +39,12 @@ class SOFTGROUND_OT_add_ground(OnGround, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_remove_ground(bpy.types.Operator):
+class SOFTGROUND_OT_remove_ground(RemovesChosen):
     """Take the ground out of the list; it stays in the scene as it is"""
 
     bl_idname = "softground.remove_ground"
     bl_label = "Remove Ground"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a ground is chosen in the list."""
-        return chosen_of(settings.options_of(context), "grounds", "active_ground") is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        remove_chosen(settings.options_of(context), "grounds", "active_ground")
-        return {"FINISHED"}
+    of_list = ("grounds", "active_ground")
 
 
 class SOFTGROUND_OT_choose_ground(bpy.types.Operator):

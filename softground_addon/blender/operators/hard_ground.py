@@ -10,7 +10,7 @@ from .. import settings
 from ..ground import ground_checks, trail_detail
 from ..operator_base import reports_errors
 from ..translation import translated
-from .panel_base import chosen_of, remove_chosen
+from .panel_base import RemovesChosen
 
 
 class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
@@ -46,21 +46,12 @@ class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_remove_hard_ground(bpy.types.Operator):
+class SOFTGROUND_OT_remove_hard_ground(RemovesChosen):
     """Take the object out of the list; it stays in the scene as it is"""
 
     bl_idname = "softground.remove_hard_ground"
     bl_label = "Remove Hard Ground"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if an object is chosen in the list."""
-        return chosen_of(settings.options_of(context), "hard_grounds", "active_hard_ground") is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        remove_chosen(settings.options_of(context), "hard_grounds", "active_hard_ground")
-        return {"FINISHED"}
+    of_list = ("hard_grounds", "active_hard_ground")
 
 
 CLASSES = (SOFTGROUND_OT_add_hard_ground, SOFTGROUND_OT_remove_hard_ground)

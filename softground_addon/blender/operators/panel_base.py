@@ -8,7 +8,7 @@ import bpy
 
 from .. import session, settings
 from ..ground import baked_ground
-from ..translation import CONTEXT
+from ..translation import CONTEXT, translated
 
 CATEGORY = "SoftGround"
 """The sidebar's tab."""
@@ -97,11 +97,30 @@ def chosen_of(owner: Any, items: str, active: str) -> Any:
     return listed[number] if 0 <= number < len(listed) else None
 
 
-def remove_chosen(owner: Any, items: str, active: str) -> None:
-    """Take the chosen item out of a list of `owner`, and choose the one that comes into its place."""
-    listed = getattr(owner, items)
-    listed.remove(getattr(owner, active))
-    setattr(owner, active, max(0, min(getattr(owner, active), len(listed) - 1)))
+class RemovesChosen(bpy.types.Operator):
+    """Operators that take the chosen item out of a list; the one that comes into its place is chosen then."""
+
+    bl_options: Any = {"REGISTER", "UNDO"}
+    of_list = ("items", "active_item")
+    """Names of the list and of the number of what is chosen in it."""
+
+    @staticmethod
+    def owner(options: Any) -> Any:
+        """What the list belongs to, None if it is not there."""
+        return options
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """True if an item is chosen."""
+        cls.poll_message_set(translated("Select an item of the list first"))
+        return chosen_of(cls.owner(settings.options_of(context)), *cls.of_list) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        owner, (items, active) = self.owner(settings.options_of(context)), self.of_list
+        listed = getattr(owner, items)
+        listed.remove(getattr(owner, active))
+        setattr(owner, active, max(0, min(getattr(owner, active), len(listed) - 1)))
+        return {"FINISHED"}
 
 
 class Listed(bpy.types.UIList):

@@ -10,7 +10,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..operator_base import reports_errors
 from ..operators.character_editing import active_character
-from ..operators.panel_base import CharacterPanel, Listed, chosen_of, draw_list, remove_chosen
+from ..operators.panel_base import CharacterPanel, Listed, RemovesChosen, chosen_of, draw_list
 from ..translation import CONTEXT, translated
 
 
@@ -60,22 +60,13 @@ def _foot_at_hand(character: Any, chosen: bpy.types.PoseBone | None) -> str:
     return str(min(feet, key=height).name)
 
 
-class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
+class SOFTGROUND_OT_remove_foot_lock(RemovesChosen):
     """Take the chosen foot lock out of the list: its contact is locked like all others"""
 
     bl_idname = "softground.remove_foot_lock"
     bl_label = "Remove Foot Lock"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if one is chosen."""
-        cls.poll_message_set(translated("Select a foot lock in the list first"))
-        return chosen_of(active_character(settings.options_of(context)), "holds", "active_hold") is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        remove_chosen(active_character(settings.options_of(context)), "holds", "active_hold")
-        return {"FINISHED"}
+    of_list = ("holds", "active_hold")
+    owner = staticmethod(active_character)
 
 
 class SOFTGROUND_UL_foot_locks(Listed):
