@@ -29,7 +29,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.files.files import identity, read_regular
-from .manifest_values import flat, frames_in, is_number, name_in, path_in, preset_in, text_in
+from .manifest_values import flat, frames_in, grounds_in, is_number, name_in, path_in, preset_in, text_in
 
 LARGEST = 2**24
 """Size of a manifest that is read [bytes]: a hundred thousand shots."""
@@ -38,7 +38,11 @@ LARGEST = 2**24
 MOST_LOOKED_AT = 100_000
 """Most files and folders that the pattern of one shot may go through: a disk has millions, and a loop no end."""
 
-_FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "edits", "save", "in_place", "report")
+_FROM_DEFAULTS = (
+    "scene", "preset", "grounds", "frames", "cell_size", "set", "edits", "response", "save", "in_place", "report"
+)  # fmt: skip
+RESPONSES = ("layer", "keys")
+"""What a bake may write the response as."""
 _OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
 
 
@@ -64,6 +68,10 @@ class BatchShot:
         Paths below `scene.softground` and their values, in order.
     edits : Path or None
         Changes of single steps, absolute; None for the shot's own.
+    grounds : tuple of str
+        Meshes to bake on, `NAME` or `NAME=PRESET`; none for the shot's own.
+    response : str
+        One of `RESPONSES`, or "" for the shot's own.
     save : Path or None
         File of the baked shot, absolute; None for none or in place.
     in_place : bool
@@ -80,6 +88,8 @@ class BatchShot:
     cell_size: float | None = None
     settings: tuple[tuple[str, str], ...] = ()
     edits: Path | None = None
+    grounds: tuple[str, ...] = ()
+    response: str = ""
     save: Path | None = None
     in_place: bool = False
     report: Path | None = None
@@ -96,6 +106,7 @@ class BatchShot:
         options = [f"--scene={self.scene}"] if self.scene else []
         if self.preset:
             options.append(f"--preset={self.preset}")
+        options += [f"--ground={ground}" for ground in self.grounds]
         if self.frames:
             options.append(f"--frames={self.frames[0]}-{self.frames[1]}")
         if self.cell_size is not None:
@@ -103,6 +114,8 @@ class BatchShot:
         options += [f"--set={path}={value}" for path, value in self.settings]
         if self.edits:
             options.append(f"--edits={self.edits}")
+        if self.response:
+            options.append(f"--response={self.response}")
         if self.save:
             options.append(f"--save={self.save}")
         if self.in_place:
@@ -289,6 +302,8 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
         raise InputError(f"{where}: nothing would be kept: give 'save', 'in_place' or 'report'.")
     if save == file:
         raise InputError(f"{where}: 'save' is the shot itself: say in_place = true to replace it.")
+    if (response := values.get("response", "")) not in ("", *RESPONSES):
+        raise InputError(f"{where}: 'response' is {response!r}; it must be {' or '.join(map(repr, RESPONSES))}.")
     cell_size = values.get("cell_size")
     if cell_size is not None and not is_number(cell_size):
         raise InputError(f"{where}: 'cell_size' is {cell_size!r}; it must be a number of metres.")
@@ -301,6 +316,8 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
         cell_size=None if cell_size is None else float(cell_size),
         settings=tuple(overrides.items()),
         edits=edits,
+        grounds=grounds_in(values.get("grounds", []), folder, where),
+        response=response,
         save=save,
         in_place=in_place,
         report=report,
@@ -337,8 +354,9 @@ def check_places(
     shots = tuple(shots)
     read = {identity(path): what for path, what in (protected or {}).items()}
     for shot in shots:
-        if shot.preset.lower().endswith(".json"):
-            read[identity(Path(shot.preset))] = f"the preset of '{shot.name}'"
+        for preset in (shot.preset, *(ground.rpartition("=")[2] for ground in shot.grounds)):
+            if preset.lower().endswith(".json"):
+                read[identity(Path(preset))] = f"a preset of '{shot.name}'"
         if shot.edits:
             read[identity(shot.edits)] = f"the edits of '{shot.name}'"
     sources: dict[str, list[str]] = {}

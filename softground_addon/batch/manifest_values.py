@@ -92,6 +92,16 @@ def preset_in(value: object, folder: Path, where: str) -> str:
     return str(path_in(name, folder, where)) if name.lower().endswith(".json") else name
 
 
+def grounds_in(value: object, folder: Path, where: str) -> tuple[str, ...]:
+    """Grounds, `NAME` or `NAME=PRESET` each, with absolute paths of preset files."""
+    if not isinstance(value, list):
+        raise InputError(f"{where}: 'grounds' is {value!r}; it must be a list such as ['Yard=Mud', 'Crate'].")
+    named = [text_in(text, f"{where}: 'grounds'").rpartition("=") for text in value]
+    return tuple(
+        f"{name}{equals}{preset_in(preset, folder, where) if equals else preset}" for name, equals, preset in named
+    )
+
+
 def frames_in(value: object, where: str) -> tuple[int, int]:
     if (
         not isinstance(value, list)

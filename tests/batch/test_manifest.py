@@ -42,6 +42,8 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
         frames = [-5, 1120]
         set.material.layer_depth = 0.5
         edits = "edits/{name}.json"
+        grounds = ["Yard=grounds/bog.json", "Crate", "Stairs=Snow"]
+        response = "keys"
         """
     )
     assert first == BatchShot(
@@ -56,11 +58,15 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
     assert second.options == [
         "--scene=Layout",
         f"--preset={FOLDER / 'grounds/bog.json'}",
+        f"--ground=Yard={FOLDER / 'grounds/bog.json'}",
+        "--ground=Crate",
+        "--ground=Stairs=Snow",
         "--frames=-5-1120",
         "--cell-size=0.02",
         "--set=material.layer_depth=0.5",
         "--set=keep_forces=true",
         f"--edits={FOLDER / 'edits/twenty.json'}",
+        "--response=keys",
         f"--save={FOLDER / 'baked/twenty.blend'}",
         f"--report={FOLDER / 'baked/twenty.json'}",
     ]
@@ -112,6 +118,9 @@ def test_a_pattern_is_a_shot_for_each_file(tmp_path):
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nframes = [1, 99999999]", "'frames' is"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\ncell_size = nan", "number of metres"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\npreset = 1", "'preset' is 1"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\ngrounds = 'Yard'", "'grounds' is 'Yard'; it must be a list"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\ngrounds = ['']", "'grounds' is ''"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nresponse = 'no'", "'response' is 'no'; .*'layer' or 'keys'"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nscene = ''", "'scene' is ''"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = 1", "must be a table"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = inf }", "'a' is inf"),
@@ -185,7 +194,9 @@ def test_a_manifest_that_is_a_pipe_or_never_ends_is_refused(tmp_path):
         ("{ file = 'a.blend', save = 'night.toml' }", "'a' would write over the manifest"),
         ("{ file = 'a.blend', report = 'link/Night.TOML' }", "'a' would write over the manifest"),
         ("{ file = 'a.blend', report = 'bog.json' }, { file = 'b.blend', save = 'c', preset = 'bog.json' }",
-         "'a' would write over the preset of 'b'"),
+         "'a' would write over a preset of 'b'"),
+        ("{ file = 'a.blend', report = 'bog.json' }, { file = 'b.blend', save = 'c', grounds = ['Yard=bog.json'] }",
+         "'a' would write over a preset of 'b'"),
         ("{ file = 'a.blend', report = 'e.json' }, { file = 'b.blend', save = 'c', edits = 'e.json' }",
          "'a' would write over the edits of 'b'"),
         ("{ file = 'a.blend', save = 'link/B.blend' }, { file = 'b.blend', save = 'c' }", "'a' would write over"),

@@ -334,6 +334,8 @@ def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
         cell_size=options.cell_size,
         settings=tuple(options.overrides),
         edits=Path(os.path.realpath(options.edits)) if options.edits else None,
+        grounds=tuple(options.grounds),
+        response=options.response or "",
         save=None if options.in_place else target,
         in_place=options.in_place,
         report=Path(os.path.realpath(options.report)) if options.report else None,

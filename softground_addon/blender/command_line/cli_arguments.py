@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...batch import command
+from ...batch.manifest import RESPONSES
 from ...batch.manifest_values import frame_range
 from ..output import export_formats
 
@@ -84,7 +85,7 @@ def _add_bake(bake: argparse.ArgumentParser) -> None:
     bake.add_argument("--edits", type=Path, metavar="FILE.json", help="changes of single steps, by the report's ids")
     bake.add_argument(
         "--response",
-        choices=("layer", "keys"),
+        choices=RESPONSES,
         help="lower the feet into their prints: as a layer, or in the keys of a new action",
     )
     _add_destination(bake)

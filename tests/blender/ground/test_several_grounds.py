@@ -321,10 +321,12 @@ def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presse
 
 
 def test_the_command_line_names_several_grounds_each_with_its_preset(crate, tmp_path):
-    path, report = tmp_path / "shot.blend", tmp_path / "report.json"
+    path, report, receipt = tmp_path / "shot.blend", tmp_path / "report.json", tmp_path / "receipt.json"
     bpy.context.scene.softground.ground = None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    command_line.run("bake", path, "--ground", "Field=Snow", "--ground", "Crate=Mud", "--report", report)
+    chosen = ("--ground=Field=Snow", "--ground=Crate=Mud", "--response=layer")
+    command_line.run("bake", path, *chosen, "--report", report, "--receipt", receipt)
+    assert json.loads(receipt.read_text())["options"][:3] == list(chosen)
     result = json.loads(report.read_text())
     assert {row["ground"] for row in result["steps"]} == {"Field", CRATE}
     assert result["inputs"]["preset"] == "Snow"
