@@ -19,7 +19,7 @@ from ..core.rig.recording import SceneUnits
 from ..core.settings import DOWN, BakeSettings, CharacterSettings, GroundSettings, ObjectName, ResponseOptions
 from ..core.weather.felt_weather import FeltWeather
 from ..core.weather.weather import span_of
-from . import ground_slots, tread_images
+from . import further_grounds, ground_slots, tread_images
 from .camera_views import camera_view
 from .state import state
 
@@ -104,9 +104,11 @@ def _wet_grounds(options: Any) -> tuple[str, ...]:
 
 
 def forget_deleted_ground(options: Any) -> None:
-    """Take grounds that were deleted out of the settings."""
-    if options.ground is not None and not exists(options.ground):
+    """Take grounds that were deleted out of the settings; the next in the list becomes the first where that was."""
+    if not exists(options.ground):
         options.ground = None
+        if following := next((item for item in options.grounds if exists(item.object)), None):
+            further_grounds.choose(options, following)
     for number in reversed(range(len(options.grounds))):
         if not exists(options.grounds[number].object):
             options.grounds.remove(number)

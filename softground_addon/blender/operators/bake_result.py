@@ -123,12 +123,12 @@ def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: s
         if "Set Mass" in text:
             layout.prop(character, "mass")
     text = "\n".join(warnings)
-    listed = {item.object.name for item in options.hard_grounds if item.object}
+    listed = {item.object.name for item in (*options.hard_grounds, *options.grounds) if item.object}
     for name in dict.fromkeys(re.findall(r"Press Add '([^']+)'", text)):
         if name not in listed:
-            layout.operator(
-                "softground.add_hard_ground", text=translated("Add '{name}'", name=name), translate=False
-            ).object = name
+            hard, soft = translated("Add '{name}'", name=name), translated("Add '{name}' as Ground", name=name)
+            layout.operator("softground.add_hard_ground", text=hard, translate=False).object = name
+            layout.operator("softground.add_ground", text=soft, translate=False).object = name
     for words, operator in _OPERATORS.items():
         if re.search(words, text):
             button = layout.operator(operator)

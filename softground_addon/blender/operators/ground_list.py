@@ -11,10 +11,10 @@ from ..ground import ground_checks, trail_detail
 from ..operator_base import OnGround, reports_errors
 from ..reading import analysis
 from ..translation import translated
-from .panel_base import RemovesChosen, chosen_of
+from .panel_base import OnMeshes, RemovesChosen, chosen_of
 
 
-class SOFTGROUND_OT_add_ground(OnGround, bpy.types.Operator):
+class SOFTGROUND_OT_add_ground(OnMeshes, OnGround, bpy.types.Operator):
     """Let the selected meshes take prints too, each by itself: crates, stairs, rocks beside the ground"""
 
     bl_idname = "softground.add_ground"
@@ -24,8 +24,8 @@ class SOFTGROUND_OT_add_ground(OnGround, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
-        meshes = [trail_detail.ground_of(obj) for obj in context.selected_objects if obj.type == "MESH"]
-        chosen = [obj for obj in dict.fromkeys(meshes) if obj not in settings.grounds_of(options)]
+        meshes = dict.fromkeys(map(trail_detail.ground_of, self.meshes(context)))
+        chosen = [obj for obj in meshes if obj not in settings.grounds_of(options)]
         if not chosen:
             raise InputError("Select meshes to walk on, other than those that are grounds already.")
         for obj in chosen:

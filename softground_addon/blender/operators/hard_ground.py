@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import StringProperty
 
 from ...core.errors import InputError
 from .. import settings
 from ..ground import ground_checks, trail_detail
 from ..operator_base import reports_errors
 from ..translation import translated
-from .panel_base import RemovesChosen
+from .panel_base import OnMeshes, RemovesChosen
 
 
-class SOFTGROUND_OT_add_hard_ground(bpy.types.Operator):
+class SOFTGROUND_OT_add_hard_ground(OnMeshes, bpy.types.Operator):
     """Let soles stand on the selected meshes, which take no prints: crates, stairs, floors, rocks"""
 
     bl_idname = "softground.add_hard_ground"
     bl_label = "Add Hard Ground"
     bl_options = {"REGISTER", "UNDO"}
 
-    object: StringProperty(
-        name="Object",
-        description="Name of the mesh; those that are selected if empty",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
-
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
-        chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
-        if self.object:
-            chosen = [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
         taken = [*settings.grounds_of(options), *settings.hard_grounds_of(options)]
-        chosen = [obj for obj in chosen if trail_detail.ground_of(obj) not in taken]
+        chosen = [obj for obj in self.meshes(context) if trail_detail.ground_of(obj) not in taken]
         if not chosen:
             raise InputError("Select meshes to stand on, other than the ground and those that are in Hard Ground.")
         for obj in chosen:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.props import StringProperty
 
 from .. import session, settings
 from ..ground import baked_ground
@@ -95,6 +96,22 @@ def chosen_of(owner: Any, items: str, active: str) -> Any:
     """The item that is chosen in a list of `owner`; None if none is, or there is no owner."""
     listed, number = (getattr(owner, items), getattr(owner, active)) if owner is not None else ((), 0)
     return listed[number] if 0 <= number < len(listed) else None
+
+
+class OnMeshes:
+    """Operators on a mesh that is named, or on those that are selected."""
+
+    object: StringProperty(
+        name="Object",
+        description="Name of the mesh; those that are selected if empty",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    def meshes(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """What is meant; a named object whatever it is, none if the scene has none of that name."""
+        if self.object:
+            return [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
+        return [obj for obj in context.selected_objects if obj.type == "MESH"]
 
 
 class RemovesChosen(bpy.types.Operator):

@@ -177,6 +177,7 @@ class SOFTGROUND_OT_create_ground(Reading):
             _check_no_instance(bpy.context)
             if chosen := selected_ground(bpy.context):
                 return (yield from _taken_as_ground(scene, chosen))
+        options, has_first = scene.softground, settings.exists(scene.softground.ground)
         wanted = shots.settings_of(scene)
         plan = yield from shots.fit_ground(scene, wanted)
         with ExitStack() as drafts:
@@ -184,7 +185,10 @@ class SOFTGROUND_OT_create_ground(Reading):
             name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
             ground = settings.resolve(name)
             with analysis.own_changes(scene):
+                before = options.ground
                 created_ground.publish(scene, ground, wanted.surface)
+                if before and not has_first:  # it was the next in the list
+                    further_grounds.own_material(options, further_grounds.add(options, before))
         created_ground.select(scene, ground)
         count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
         text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)

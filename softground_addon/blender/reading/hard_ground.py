@@ -116,5 +116,6 @@ def _finding(name: str, rests: Sequence[RaisedRest]) -> Finding:
         "hard_ground",
         "warning",
         f"{count} on '{name}', from frame {first:.0f} on, without a print, but '{name}' is not in Hard Ground.",
-        f"Press Add '{name}', so that the bake notices when it is moved, or hide it if nothing stands on it.",
+        f"Press Add '{name}', so that the bake notices when it is moved, or Add '{name}' as Ground for prints in it; "
+        "hide it if nothing stands on it.",
     )

@@ -115,8 +115,9 @@ def test_the_warning_has_a_button_that_adds_the_crate_and_the_bake_notices_when_
     layout = MagicMock()
     layout.operator.side_effect = lambda name, **how: drawn.append((name, button := SimpleNamespace(**how))) or button
     bake_result.draw_remedies(layout, scene.softground, warnings)
-    ((name, button),) = drawn
+    (name, button), (other_name, other) = drawn
     assert (name, button.text, button.object) == ("softground.add_hard_ground", "Add 'Crate'", "Crate")
+    assert (other_name, other.text, other.object) == ("softground.add_ground", "Add 'Crate' as Ground", "Crate")
     bpy.ops.softground.add_hard_ground(object=button.object)
     assert settings.hard_grounds_of(scene.softground) == [crate]
     drawn.clear()

@@ -559,3 +559,43 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     bpy.ops.softground.remove_ground()
     (warning,) = bake(scene).report["warnings"]
     assert "Press Add 'Crate'" in warning
+    assert "Add 'Crate' as Ground" in warning
+    assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
+    assert settings.grounds_of(scene.softground)[1:] == [crate]
+    assert bake(scene).report["warnings"] == []
+
+
+@pytest.mark.parametrize("is_purged", [True, False])
+def test_the_next_ground_becomes_the_first_where_that_was_deleted(crate, is_purged):
+    scene, options = bpy.context.scene, bpy.context.scene.softground
+    slab, floor = box(scene, "Slab", 0.1, y=(3.0, 4.0)), options.ground
+    bpy.context.view_layer.update()
+    item = also(crate)
+    also(slab)
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("mud"))
+    if is_purged:
+        bpy.data.objects.remove(floor)
+    else:
+        delete(floor)
+    result = bake(scene)
+    assert settings.listed_grounds(options) == [crate, slab]
+    assert options.material.surface == "mud"
+    assert {row["ground"] for row in result.report["steps"]} == {CRATE}
+
+
+def test_a_ground_that_is_created_in_the_place_of_one_that_was_deleted_leaves_the_others_in_the_list(crate):
+    options = bpy.context.scene.softground
+    item = also(crate)
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("mud"))
+    delete(options.ground)
+    assert bpy.ops.softground.create_ground(use_selected=False) == {"FINISHED"}
+    assert settings.grounds_of(options) == [options.ground, crate]
+    assert options.grounds[0].material.surface == "mud"
+
+
+def delete(obj):
+    """As in the viewport."""
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.ops.object.delete()
