@@ -102,7 +102,7 @@ def recognise(
     reading = record(scene, armature, samples, known, units, shapes=shapes)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     bones = rest_bones(resolve(rig))
-    weighing = skin_mass.slices(skin, bones, recording.of(np.array([0])))
+    weighing = skin_mass.slices(skin, bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
@@ -125,7 +125,7 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     samples = range(first, min(last, first + MOST_FRAMES) + 1)
     reading = record_body(scene, name, body, samples, units_about(scene, resolve(name)))
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
+    weighing = skin_mass.slices(body.skin, body.bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     seen = yield from jobs.meanwhile(read, shown_by_skin.slices(body.bones, body.skin, recording))
     soles = with_toes(seen, recording)
