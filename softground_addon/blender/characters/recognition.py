@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -9,7 +10,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.rig.bare_body import BareBody, with_toes
-from ...core.rig.bones import RigBones
+from ...core.rig.bones import RigBones, extent
 from ...core.rig.mapping import RigMapping, SoleSource, bones_of
 from ...core.rig.recording import Recording
 from ...core.rig.rig_skin import RigSkin
@@ -28,6 +29,9 @@ from ..settings import name_of, resolve
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
+
+FOOT_REACH = 0.2
+"""A foot and the bone with most of the skin on which it stands are nearer than this, over the size of the rig."""
 
 SHARE = 0.3
 """Of a reading of the whole shot, as it is shown to the user."""
@@ -79,6 +83,7 @@ def recognise(
     mapping = _mapped(armature)
     if armature.mode == "EDIT":
         return Recognised(mapping)
+    shaped = _mapped(armature, named=False) if mapping.method == "names" else mapping
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
     skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature))
     armature = resolve(rig)
@@ -93,15 +98,18 @@ def recognise(
         first, last = (round(frame / units.time_stretch) for frame in frames)
         samples = range(first, min(last, first + MOST_FRAMES) + 1)
     shapes = [shape.key for shape in skin.shapes]
-    reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units, shapes=shapes)
+    known = [*skin.bones, *bones_of(mapping), *bones_of(shaped)]
+    reading = record(scene, armature, samples, known, units, shapes=shapes)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
     bones = rest_bones(resolve(rig))
-    weighing = skin_mass.slices(skin, bones, recording.of(np.array([0])))
+    weighing = skin_mass.slices(skin, bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
     seen = yield from jobs.meanwhile(read, shown_by_skin.slices(bones, skin, recording))
-    return Recognised(replace(_joined(bones, skin, mapping, seen), mass=mass), skin, recording)
+    agreeing = (may_be for may_be in (mapping, shaped) if _agrees(bones, may_be, shaped, seen))
+    joined = _joined(bones, skin, next(agreeing, RigMapping(method="skin")), seen)
+    return Recognised(replace(joined, mass=mass), skin, recording)
 
 
 def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recognised]:
@@ -117,19 +125,41 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     samples = range(first, min(last, first + MOST_FRAMES) + 1)
     reading = record_body(scene, name, body, samples, units_about(scene, resolve(name)))
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    weighing = skin_mass.slices(body.skin, body.bones, recording.of(np.array([0])))
+    weighing = skin_mass.slices(body.skin, body.bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     seen = yield from jobs.meanwhile(read, shown_by_skin.slices(body.bones, body.skin, recording))
     soles = with_toes(seen, recording)
     return Recognised(RigMapping(soles=soles, method="skin", mass=mass), body.skin, recording, body)
 
 
-def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
+def _mapped(armature: bpy.types.Object, *, posed: bool = False, named: bool = True) -> RigMapping:
     """Mapping by names and rest pose, or without a skin by the current pose; empty if none of them gives one."""
     try:
-        return map_rig(armature, posed=posed)
+        return map_rig(armature, posed=posed, named=named)
     except InputError:
         return RigMapping(method="skin")
+
+
+def _held(bones: RigBones, foot: SoleSource, seen: Iterable[SoleSource]) -> list[SoleSource]:
+    """The contacts of which a foot has a part."""
+    family, _ = bone_families(bones, foot)
+    return [contact for contact in seen if family & {*contact.parts}]
+
+
+def _agrees(bones: RigBones, mapping: RigMapping, shaped: RigMapping, seen: tuple[SoleSource, ...]) -> bool:
+    """True if feet are near what the skin shows of them, as hips are not, and if none is idle where the rest pose has
+    feet elsewhere that bear."""
+    reach = FOOT_REACH * extent(np.array([bone.head for bone in bones.values()]), np.eye(4))
+    others = {foot.bone for foot in shaped.soles}
+    bearing, idle = [], False
+    for foot in mapping.soles:
+        ends = [bones[bone].end(end) for bone in (foot.bone, foot.toe_bone) if bone for end in ("head", "tail")]
+        held = _held(bones, foot, seen)
+        if any(np.linalg.norm(ends - bones[contact.bone].head, axis=1).min() > reach for contact in held):
+            return False
+        bearing += held
+        idle |= not held and foot.bone not in others
+    return not idle or all(contact in bearing for foot in shaped.soles for contact in _held(bones, foot, seen))
 
 
 def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
@@ -147,8 +177,7 @@ def _joined(bones: RigBones, skin: RigSkin, mapping: RigMapping, seen: tuple[Sol
     for source in mapping.soles:
         if source in bare and shows_legs:
             continue
-        family, _ = bone_families(bones, source)
-        same = [contact for contact in remaining if family & {*contact.parts}]
+        same = _held(bones, source, remaining)
         remaining = [contact for contact in remaining if contact not in same]
         parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
         soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))

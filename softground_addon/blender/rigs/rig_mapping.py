@@ -25,7 +25,7 @@ CHOOSE_CONTACTS = (
 """Remedy if no feet are found."""
 
 
-def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
+def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = True) -> RigMapping:
     """Joints and feet of an armature.
 
     Parameters
@@ -34,6 +34,8 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
         Only read; may be linked or overridden.
     posed : bool
         True if the current pose stands in for the rest pose.
+    named : bool
+        False if the names say nothing.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
     """
     require_armature(armature)
     deforming = {bone.name for bone in armature.data.bones if bone.use_deform}
-    mapping = map_by_names(rest_bones(armature), deforming)
+    mapping = map_by_names(rest_bones(armature), deforming) if named else None
     if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
         shape = map_by_rest_pose(armature, posed=posed)
         if shape is not None:

@@ -16,7 +16,7 @@ from ..numerics.components import components
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
 from ..rig.recording import Recording
-from ..rig.rig_skin import RigSkin, carried, skinned
+from ..rig.rig_skin import RigSkin, of_body, skinned
 from ..skin.volume import welded
 
 NO_SOLE = -1
@@ -92,7 +92,7 @@ class RespondedSkin:
         self._recording = _Responding(**recorded, parts=_parts_of_bones(worn, motion, response), body=response.body)
         triangles = worn.skin.triangles
         sole = np.append(_soles_of_bones(worn), NO_SOLE)[worn.skin.part[triangles[:, 0]]]
-        sole[carried(worn.skin, worn.bones)[triangles].any(axis=1)] = NO_SOLE
+        sole[~of_body(worn.skin, worn.bones, worn.recording)[triangles].all(axis=1)] = NO_SOLE
         self.triangles = {int(number): triangles[sole == number] for number in np.unique(sole)}
 
     def at(self, samples: Indices) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 
 from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
-from .bones import RigBones, above
+from .bones import RigBones, above, extent
 from .mapping import BoneEnd, RigMapping, SoleSource
 
 _JOINT_HEADS = {
@@ -21,12 +21,18 @@ _JOINT_HEADS = {
 }
 """Joint to the segment whose head it is."""
 
+_SEGMENTS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand"))
+"""Segments of legs and arms, from the body outward."""
+
+_TOES_REACH = 0.2
+"""Toes that hang elsewhere than on their foot begin this near to it, over the size of the rig."""
+
 _HIPS_OF_SOME = ("root", "cog", "spine")
 """Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
 
 
 def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
-    """The mapping that the names give, or None where they name no foot.
+    """The mapping that the names give, or None where they name no foot, or limbs that hang together as none do.
 
     Parameters
     ----------
@@ -35,11 +41,12 @@ def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
     """
     names = read_names(bones, deforming)
     joints: dict[str, BoneEnd] = {}
-    soles = []
+    soles, limbs = [], []
     for side, suffix in (("L", "_l"), ("R", "_r")):
         limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
         _settle_ambiguities(limb, names, bones, side, deforming)
         _keep_to_one_leg(limb, names, bones, side)
+        limbs += [[limb[segment] for segment in segments] for segments in _SEGMENTS]
         foot, toe = limb["foot"], limb["toe"]
         for joint, segment in _JOINT_HEADS.items():
             if bone := limb[segment]:
@@ -49,10 +56,17 @@ def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
         if foot or toe:
             joints["toe" + suffix] = (toe or foot, "tail")
             soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
-    if not soles:
+    if not soles or not _are_limbs(limbs, bones):
         return None
     joints.update(_map_trunk(names, bones, joints, deforming))
     return RigMapping(joints=joints, soles=tuple(soles))
+
+
+def _are_limbs(limbs: Sequence[Sequence[str]], bones: RigBones) -> bool:
+    """True if no limb hangs on another one, and none of its segments on one farther out; empty names are no bones."""
+    place = {bone: (limb, number) for limb, chain in enumerate(limbs) for number, bone in enumerate(chain) if bone}
+    pairs = ((place[bone], place[upper]) for bone in place for upper in above(bones, bone) if upper in place)
+    return all(limb == other and number > before for (limb, number), (other, before) in pairs)
 
 
 def _settle_ambiguities(
@@ -74,10 +88,12 @@ def _settle_ambiguities(
 
 def _keep_to_one_leg(limb: dict[str, str], names: list[BoneName], bones: RigBones, side: str) -> None:
     """The toe that hangs on the foot, and the shin and thigh that it hangs on, where another leg has such names too."""
-    foot = limb["foot"]
-    if foot and limb["toe"] and foot not in above(bones, limb["toe"]):
+    foot, toe = limb["foot"], limb["toe"]
+    if foot and toe and foot not in above(bones, toe):
         toes = [name for name in names if foot in above(bones, name.bone)]
-        limb["toe"] = best(toes, LIMBS["toe"], side) or limb["toe"]
+        reach = _TOES_REACH * extent(np.array([bone.head for bone in bones.values()]), np.eye(4))
+        is_near = np.linalg.norm(bones[toe].head - bones[foot].head) < reach
+        limb["toe"] = best(toes, LIMBS["toe"], side) or (toe if is_near else "")
     chain = [*above(bones, foot)] if foot else []
     for segment in ("shin", "thigh"):
         if limb[segment] not in chain:

@@ -129,7 +129,11 @@ def skinned(
 
 
 _PROBES = 8
-"""Poses in which the vertices near the ground are looked for."""
+"""Poses in which the vertices near the ground are looked for, and what a body leaves behind."""
+
+_LEAVES, _STAYS = 0.5, 1e-3
+"""Where all that moves goes this much farther away from a part, over the size of the body, it leaves what moves less
+than this over that way."""
 
 _NEAR = 0.15
 """Distance from the lowest vertex that a followed one comes within, in body heights."""
@@ -170,8 +174,8 @@ def followed_skin(
     linked : bool
         True to find parts that hang together, and mirror images.
     """
-    body = np.flatnonzero(~carried(skin, bones))
-    probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
+    body = np.flatnonzero(of_body(skin, bones, recording))
+    probes = _probes(recording)
     height = (yield from skinned.slices(skin, bones, probes, body, axes=slice(2, 3)))[..., 0]
     size = float(np.median(np.ptp(height, axis=1)))
     if not 0 < size < np.inf:
@@ -210,7 +214,14 @@ def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
     return np.asarray(np.floor((rank + 1) * share + 1e-9) > np.floor(rank * share + 1e-9))
 
 
-def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
+def of_body(skin: RigSkin, bones: RigBones, recording: Recording) -> NDArray[np.bool_]:
+    """Vertices (V,) of the body itself: not of props that it carries, nor of what it leaves behind."""
+    parts = np.append([name in recording.bones for name in skin.bones], True)
+    left = _left_behind(skin, bones, _probes(recording)) if parts.all() else ~parts
+    return ~(_carried(skin, bones) | left[skin.part])
+
+
+def _carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
     """Vertices of props that a character carries: hung on bones that hang from bones with a skin.
 
     A robot of rigid pieces has no such skin above them; there they are its body.
@@ -218,6 +229,30 @@ def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
     clothed = {skin.bones[number] for number in np.unique(skin.part[~skin.hung]) if number < len(skin.bones)}
     carries = [any(parent in clothed for parent in above(bones, name)) for name in skin.bones]
     return skin.hung & np.array([*carries, False])[skin.part]
+
+
+def _left_behind(skin: RigSkin, bones: RigBones, poses: Recording) -> NDArray[np.bool_]:
+    """Parts that stay where they are in all poses while the others go away, as a floor on a root bone does."""
+    count = len(skin.bones) + 1
+    size = np.bincount(skin.part, minlength=count)
+    middle = np.stack([np.bincount(skin.part, along, count) for along in skin.vertices.T], axis=-1)
+    middle = np.append(middle / np.maximum(size, 1)[:, None], np.ones((count, 1)), axis=1)
+    backs = [poses.bone(name) @ np.linalg.inv(bones[name].matrix) for name in skin.bones]
+    path = np.stack([matrices[:, :3] @ at for matrices, at in zip([*backs, poses.armature], middle, strict=True)])
+    used = size > 0
+    far = _LEAVES * np.ptp(path[used, 0], axis=0).max(initial=0.0)
+    still = np.ptp(path, axis=1).max(axis=-1) < _STAYS * far
+    moves = np.flatnonzero(used & ~still)
+    left = np.zeros(count, dtype=bool)
+    for part in np.flatnonzero(used & still) if len(moves) else ():
+        gap = np.linalg.norm(path[moves] - path[part], axis=-1).min(axis=0)
+        left[part] = np.ptp(gap) > far
+    return left
+
+
+def _probes(recording: Recording) -> Recording:
+    """A few of the poses of a recording, from first to last."""
+    return recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
 
 
 def _beside(skin: RigSkin, parts: Indices) -> NDArray[np.bool_]:

@@ -11,22 +11,23 @@ from ..numerics.slices import Slices, sliced
 from ..skin.volume import body_volume, welded
 from .bones import RigBones
 from .recording import Recording
-from .rig_skin import RigSkin, carried, skinned
+from .rig_skin import RigSkin, of_body, skinned
 
 DENSITY = 1000.0
 """Density of bodies [kg/m³]: people float, barely."""
 
 
 @sliced
-def skin_mass(skin: RigSkin, bones: RigBones, pose: Recording) -> Slices[float]:
+def skin_mass(skin: RigSkin, bones: RigBones, recording: Recording) -> Slices[float]:
     """Mass of a body of the volume of its skin [kg], to two digits, 0 where the skin encloses nothing.
 
     Parameters
     ----------
-    pose : Recording
-        Of all `skin.bones`, at one frame.
+    recording : Recording
+        Of all `skin.bones`; its first pose is looked at.
     """
-    body = ~carried(skin, bones)[skin.triangles].any(axis=1)
+    body = of_body(skin, bones, recording)[skin.triangles].all(axis=1)
+    pose = recording.of(np.array([0]))
     points = (yield from skinned.slices(skin, bones, pose, np.arange(len(skin.vertices))))[0].astype(float)
     place = welded(skin.vertices)
     yield
@@ -48,7 +49,7 @@ def centre_of_volume(skin: RigSkin, bones: RigBones, recording: Recording) -> Ar
     recording : Recording
         Of all `skin.bones`.
     """
-    body = skin.triangles[~carried(skin, bones)[skin.triangles].any(axis=1)]
+    body = skin.triangles[of_body(skin, bones, recording)[skin.triangles].all(axis=1)]
     part, count = skin.part[body[:, 0]], len(skin.bones) + 1
     corners = skin.vertices[body]
 

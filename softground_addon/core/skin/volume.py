@@ -112,6 +112,9 @@ def body_volume(points: Array, triangles: Indices) -> Slices[float]:
     """
     if not len(triangles):
         return 0.0
+    corners = np.sort(triangles, axis=1)
+    _, once = np.unique((corners[:, 0] * len(points) + corners[:, 1]) * len(points) + corners[:, 2], return_index=True)
+    triangles = triangles[once]  # a copy of the skin in its place, as an outline or another level of detail, is none
     known = pieces(points, triangles)
     best, closed = 0.0, -1.0
     for axis in (2, 0, 1):

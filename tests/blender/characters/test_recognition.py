@@ -152,9 +152,23 @@ def test_skin_that_no_bone_moves_is_no_contact(scene):
     assert {sole.bone for sole in character.soles} == set(LEGS)
 
 
+@pytest.mark.parametrize(("last", "prints"), [(96, {"foot.L", "foot.R"}), (12, {"foot.L", "foot.R", "Root"})])
+def test_a_floor_that_the_body_leaves_behind_is_none_of_it(addon, scene, last, prints):
+    bpy.ops.softground.add_sample_scene()
+    armature = bpy.context.view_layer.objects.active
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones.new("Root").tail = (0, 0.2, 0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    box("floor", 1.0, (0, 0, -0.5), armature, "Root")
+    mapping = jobs.run(recognise(scene, armature, (1, last))).mapping
+    assert {sole.bone for sole in mapping.soles} == prints
+    assert mapping.mass == pytest.approx(78.0 if last == 96 else 1078.0, rel=0.05)
+
+
 def test_a_fingertip_on_the_ground_does_not_size_the_cells(scene):
     armature = stool()
     box("tip", 0.004, (0, 0.1, 0.062), armature, "Root")
+    rigs.key(armature, "location", {1: (0, 0, 0), FRAMES: (0.002, 0, 0)}, bone="Root")
     character = add_character(scene, armature)
     assert "Root" in {sole.bone for sole in character.soles}
     assert 0.02 < character.sole_length < 0.05

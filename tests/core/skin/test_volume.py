@@ -94,6 +94,12 @@ def test_what_lies_within_counts_once_and_what_lies_beside_counts_too():
     assert body_volume(*united(sphere(1.0), shirt)) == pytest.approx(BALL, rel=0.12)
 
 
+def test_a_copy_of_the_skin_in_its_place_counts_once():
+    vertices, triangles = sphere(1.0)
+    corners = np.roll(triangles, 1, axis=1)
+    assert body_volume(vertices, np.concatenate([triangles, corners])) == pytest.approx(BALL, rel=0.02)
+
+
 def test_what_is_flat_holds_nothing():
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-1.0, 1.0, 9))
     flat = np.stack([x, 0 * x, y], -1).reshape(-1, 3)
