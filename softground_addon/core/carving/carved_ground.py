@@ -7,7 +7,6 @@ from math import ceil, floor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.hard_ground import bare
 from ..ground.heightfield import TerrainTiles
@@ -21,7 +20,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, Walls
+from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -43,43 +42,32 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    triangles : (T, 3) int array
+    vertices : (V,) int array
+        Of the body.
+    corners : (3, T) int array
+        Triangles between them.
     sides : (T,) float array
         See `responded_skin.outsides`.
     """
 
     step: CarvedStep
-    triangles: Indices
+    vertices: Indices
+    corners: Indices
     sides: Array
-
-    def below(self, around: Array, low: Mask) -> Indices:
-        """Triangles (N, 3) that are low, and no upper sides, by the vertices (4, V, 3) around a frame."""
-        near = np.logical_or.reduce([low[corners] for corners in self.triangles.T])
-        triangles, sides = self.triangles[near], self.sides[near]
-        is_above = sides != 0
-        for places in around[1:3, :, :2]:
-            a, b, c = (places[corners] for corners in triangles.T)
-            is_above &= sides * cross(b - a, c - a) > 0
-        return triangles[~is_above]
 
 
 class Drawn(NamedTuple):
-    """A body as it passed over a frame, or its parts in ground of one kind.
+    """A part of a body as it passed over a frame.
 
     Attributes
     ----------
-    steps : list of CarvedStep
-        That its parts take.
-    nearest : (rows, columns) int array
-        The part that each cell is nearest to.
     underside : (4, rows, columns) float array
         Lowest surface over the quarters of each cell [m], infinite where there is none.
     way : (2,) float array
         Along x and y, of what moves most [m].
     """
 
-    steps: list[CarvedStep]
-    nearest: Indices
+    step: CarvedStep
     window: Window
     underside: Array
     way: Array
@@ -95,29 +83,36 @@ def _lowest(bodies: Sequence[Drawn], window: Window) -> Array:
     return lowest
 
 
-def _numbered(triangles: Indices, count: int) -> tuple[Indices, Indices]:
-    """The vertices of triangles (T, 3), of a count, and the triangles as numbers of these."""
+def numbered(corners: Indices, count: int) -> tuple[Indices, Indices]:
+    """The vertices of triangles (3, T), of a count, and the triangles as numbers of these."""
     place = np.zeros(count, dtype=np.intp)
-    place[triangles] = 1
+    place[corners] = 1
     used = np.flatnonzero(place)
     place[used] = np.arange(len(used))
-    return used, place[triangles]
+    return used, place.take(corners)
 
 
-def _passed(around: Array, triangles: Indices, needed: Array) -> tuple[Array, Indices]:
+def _below(moves: Array, corners: Indices, sides: Array) -> Mask:
+    """True for triangles (3, T) but those that face up at both ends of a frame, (T,); vertices (2, V, 3) at these."""
+    (a, b, c) = (moves[..., :2].take(corner, axis=1) for corner in corners)
+    above: Mask = (sides * cross(b - a, c - a) > 0).all(axis=0)
+    return ~above
+
+
+def _passed(around: Array, corners: Indices, needed: Array) -> tuple[Array, Indices]:
     """Places (N, 3) that vertices (4, V, 3) pass from the second to the third of these times [m], and triangles there.
 
-    Each triangle is there as often as those of its vertices need (V,) that move most.
+    Each triangle (3, T) is there as often as those of its vertices need (V,) that move most.
     """
     count = np.ceil(needed).astype(np.int8)
-    of_triangle = np.maximum.reduce([count[corners] for corners in triangles.T])
+    of_triangle = np.maximum.reduce([count.take(corner) for corner in corners])
     poses = int(of_triangle.max())
     between = cubic(np.eye(4), 1.0 + np.arange(1, poses + 1) / poses)
-    corners = []
+    drawn = []
     for number in np.flatnonzero(np.bincount(of_triangle)).tolist():
-        part = triangles[of_triangle == number]
-        corners += [part + len(count) * (-(-poses * pose // number) - 1) for pose in range(1, number + 1)]
-    return (between @ around.reshape(4, -1)).reshape(-1, 3), np.concatenate(corners)
+        part = corners[:, of_triangle == number]
+        drawn += [part + len(count) * (-(-poses * pose // number) - 1) for pose in range(1, number + 1)]
+    return (between @ around.reshape(4, -1)).reshape(-1, 3), np.concatenate(drawn, axis=1).T
 
 
 class CarvedGround:
@@ -133,12 +128,14 @@ class CarvedGround:
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
-        self._highest = 0.0
-        """Highest surface over the undisturbed ground so far [m]."""
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._cells = SampledGrid(self._untouched, cell_size, channels=7 + SAMPLES**2)
         """Terrain, its openness, the layer's floor, T, loose matter, what is recorded of the cut and of this, and K."""
+        self._tops = SampledGrid(self._terrain, cell_size, channels=1)
+        """Highest of the quarters of each cell, with the loose matter on it."""
         self._contacts: list[tuple[Window, Mask]] = []
+        self._loosened: dict[CarvedStep, Window] = {}
+        """Where steps have cut since what is loose slid before."""
         self._settling: dict[CarvedStep, int] = {}
         """Steps whose loose matter comes to rest, and for how many more frames."""
 
@@ -151,6 +148,11 @@ class CarvedGround:
         bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
         never = [nothing + np.inf] * SAMPLES**2
         return np.stack([terrain, surface.bears, bottom, terrain, nothing, nothing, nothing, *never])
+
+    def _terrain(self, x: Array, y: Array) -> Array:
+        """Heights of the undisturbed ground of a tile, from its cell centres, (1, rows, columns)."""
+        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
+        return np.nan_to_num(self._undisturbed.heights(window))[None]
 
     def press(self, since: float, frame: float) -> None:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
@@ -165,66 +167,77 @@ class CarvedGround:
             if change is not None:
                 cells.press(cells.pressed + change)
             cells.pack()
-            self._write([step], window, cells, channels, frame)
+            self._write(step, window, cells, channels, frame)
         for step in [step for step in self._pressing if step.ends <= frame]:
             self._pressing.remove(step)
             step.release()
 
-    def low(self, around: Array) -> Mask:
-        """Vertices (4, V, 3) around a frame that come near the ground in it, (V,); none of a body that is nowhere."""
-        if not np.isfinite(around).all():
-            return np.zeros(around.shape[1], dtype=bool)
-        both = around[1:3]
-        box = Window.around(both[..., :2].min(axis=(0, 1)), both[..., :2].max(axis=(0, 1)), self._cell_size)
-        terrain = self._undisturbed.heights(box)
-        over = both[..., 2] - terrain[box.cells_under(both[..., 0], both[..., 1], self._cell_size)]
-        low: Mask = (over < self._highest + HIGHEST).any(axis=0)  # what is laid in this frame heaps up
-        return low
+    def drawn(self, part: Part, around: Array) -> Drawn | None:
+        """A part of a body over a frame, None if none of it is near the ground; from its vertices (4, V, 3) around it.
 
-    def drawn(self, parts: Sequence[Part], around: Array, low: Mask, walls: Walls) -> Drawn | None:
-        """The parts of a body over a frame whose ground stands alike, None if none of them is low.
-
-        From its vertices (4, V, 3) around the frame, and which are low (V,).
+        What is in the ground is drawn all the way, what only hovers over it at the end.
         """
-        steps, middles, passed, ways = [], [], [], []
-        for part in parts:
-            step = part.step
-            if step.is_deep and step.walls == walls and len(near := part.below(around, low)):
-                steps.append(step)
-                used, near = _numbered(near, len(low))
-                middles.append(around[2, used, :2].mean(axis=0))
-                moves = around[:, used]
-                way = (moves[2] - moves[1])[:, :2]
-                distance = np.hypot(*way.T) * low[used]
-                passed.append(_passed(moves, near, np.clip(distance / step.spacing, 1.0, MOST_POSES)))
-                ways.append((float(distance.max()), way[distance.argmax()]))
-        if not steps:
+        moves, cell_size = around.take(part.vertices, axis=1), self._cell_size
+        if not part.step.is_deep or not np.isfinite(moves).all():
             return None
-        first = np.cumsum([0, *(len(places) for places, _ in passed)])
-        places = np.concatenate([places for places, _ in passed])
-        triangles = np.concatenate([corners + start for (_, corners), start in zip(passed, first, strict=False)])
-        low_corner, high_corner = (np.array([end(along) for along in places[:, :2].T]) for end in (np.min, np.max))
-        window = Window.around(low_corner, high_corner, self._cell_size).expanded(self._margin)
-        apart = self._cell_size / SAMPLES
-        origin = np.array((window.column, window.row)) * self._cell_size + apart / 2
+        lowest = moves[1:3, :, 2].min(axis=0)
+        top = self._tops.read(self._box(moves[1:3].reshape(-1, 3))).max()
+        low = lowest < top + HIGHEST  # what is laid in this frame heaps up
+        near = np.flatnonzero(np.logical_or.reduce([low.take(corner) for corner in part.corners]))
+        used, corners = numbered(part.corners.take(near, axis=1), len(low))
+        moves = moves.take(used, axis=1)
+        corners = corners[:, _below(moves[1:3], corners, part.sides.take(near))]
+        if not corners.size:
+            return None
+        way = (moves[2] - moves[1])[:, :2]
+        distance = np.hypot(*way.T) * (lowest < top).take(used)
+        places, triangles = _passed(moves, corners, np.clip(distance / part.step.spacing, 1.0, MOST_POSES))
+        window = self._box(places)
+        apart = cell_size / SAMPLES
+        origin = np.array((window.column, window.row)) * cell_size + apart / 2
         shape = window.rows * SAMPLES, window.columns * SAMPLES
         underside = lowest_surface(places, triangles, origin, shape, apart)
         of_cells = underside.reshape(window.rows, SAMPLES, window.columns, SAMPLES).transpose(1, 3, 0, 2)
-        underside = of_cells.reshape(-1, window.rows, window.columns)
-        x, y = window.centres(self._cell_size)
-        away = [(x - middle[0]) ** 2 + (y[:, None] - middle[1]) ** 2 for middle in middles]
-        return Drawn(steps, np.argmin(away, axis=0), window, underside, max(ways, key=lambda each: each[0])[1])
+        return Drawn(part.step, window, of_cells.reshape(-1, window.rows, window.columns), way[distance.argmax()])
 
-    def carve(self, body: Drawn, bodies: Sequence[Drawn], frame: float) -> None:
-        """Cut the ground to one of the bodies that are drawn."""
-        window, walls = body.window, body.steps[0].walls
+    def _box(self, places: Array) -> Window:
+        """The cells around places (N, 3)."""
+        x, y, _ = places.T
+        return Window.around(np.array((x.min(), y.min())), np.array((x.max(), y.max())), self._cell_size)
+
+    def carve(self, part: Drawn, bodies: Sequence[Drawn], frame: float) -> None:
+        """Cut the ground to one of the parts of bodies that are drawn."""
+        step, walls = part.step, part.step.walls
+        under = part.underside.min(axis=0)
+        deep = self._tops.read(part.window)[0] - under >= least_cut(self._contact(part.window), self._cell_size)
+        if (cut := part.window.around_cells(deep)) is None:
+            return
+        window = cut.expanded(self._margin)
         cells, channels = self._read(window)
-        lowest = _lowest(bodies, window)
+        underside = np.full(cells.lowest.shape, np.inf)
+        shared = window.intersection(part.window)
+        underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
-        cut = cells.cut(np.maximum(body.underside, channels[2]), body.way, walls.packing, lowest, again=again)
-        if round(frame) % self._slides_every == 0:
-            cells.slide(walls, lowest < cells.surface + THICKEST, (window.row, window.column), SWEEPS)
-        self._write(body.steps, window, cells, channels, frame, nearest=body.nearest, cut=cut)
+        cells.cut(np.maximum(underside, channels[2]), part.way, walls.packing, _lowest(bodies, window), again=again)
+        self._write(step, window, cells, channels, frame)
+        before = self._loosened.get(step)
+        self._loosened[step] = window if before is None else before.union(window)
+
+    def slide(self, bodies: Sequence[Drawn], frame: float) -> None:
+        """Let slide what was loosened since it slid before, once it is time to."""
+        if round(frame) % self._slides_every:
+            return
+        for step, window in self._loosened.items():
+            cells, channels = self._read(window)
+            cells.slide(step.walls, self._held(bodies, window, cells), (window.row, window.column), SWEEPS)
+            self._write(step, window, cells, channels, frame)
+        self._loosened.clear()
+
+    @staticmethod
+    def _held(bodies: Sequence[Drawn], window: Window, cells: CarvedCells) -> Mask:
+        """Cells of a window in which a body stands in the ground."""
+        held: Mask = _lowest(bodies, window) < cells.surface + THICKEST
+        return held
 
     def leave(self, step: CarvedStep) -> None:
         """Let what a step has carved come to rest from now on."""
@@ -242,21 +255,20 @@ class CarvedGround:
             cells, channels = self._read(window)
             if not holds and frames == self._frames_to_rest:
                 cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
-            body = _lowest(bodies, window) < cells.surface + THICKEST
-            cells.slide(step.walls, body, (window.row, window.column), ceil(sweeps / self._frames_to_rest))
+            cells.slide(step.walls, self._held(bodies, window, cells), (window.row, window.column), ceil(sweeps / self._frames_to_rest))
             if holds and frames == 1:
                 cells.gather(channels[6] * QUANTUM, THIN)
             if frames == 1:
                 del self._settling[step]
             else:
                 self._settling[step] = frames - 1
-            self._write([step], window, cells, channels, frame, 1 if frames == 1 else LEAST)
+            self._write(step, window, cells, channels, frame, 1 if frames == 1 else LEAST)
 
     def finish(self, step: CarvedStep, frame: float) -> None:
         """Record all of what a step has carved by the last frame."""
         if not step.at_rest and step.recorder.frames:
             window = step.recorder.window.expanded(self._margin)
-            self._write([step], window, *self._read(window), frame, 1)
+            self._write(step, window, *self._read(window), frame, 1)
 
     def footprint(self, step: CarvedStep) -> Footprint:
         """What a step has carved."""
@@ -279,54 +291,37 @@ class CarvedGround:
             surface=footprint.surface,
         )
 
-    def _read(self, window: Window) -> tuple[CarvedCells, Array]:
-        """The cells of a window, and their channels."""
-        channels = self._cells.read(window)
+    def _contact(self, window: Window) -> Mask:
+        """Cells of a window under soles that press."""
         contact = np.zeros((window.rows, window.columns), dtype=bool)
         for around, touching in self._contacts:
             if (shared := around.intersection(window)) is not None:
                 contact[window.slices(shared)] |= touching[around.slices(shared)]
+        return contact
+
+    def _read(self, window: Window) -> tuple[CarvedCells, Array]:
+        """The cells of a window, and their channels."""
+        channels = self._cells.read(window)
         terrain, bears, _, pressed, loose = channels[:5]
+        contact = self._contact(window)
         return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[7:], loose), channels
 
     def _write(
-        self,
-        steps: Sequence[CarvedStep],
-        window: Window,
-        cells: CarvedCells,
-        channels: Array,
-        frame: float,
-        least: int = LEAST,
-        *,
-        nearest: Indices | None = None,
-        cut: Array | None = None,
+        self, step: CarvedStep, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int = LEAST
     ) -> None:
-        """Write cells back, and record their changes that come to the least [QUANTUM], each with the nearest step."""
-        self._highest = max(self._highest, float((cells.surface - cells.terrain).max()))
-        carved = np.stack([cells.pressed - cells.standing, cells.loose])
+        """Write cells back, and record their changes that come to the least [QUANTUM] with a step."""
+        standing = cells.standing
+        carved = np.stack([cells.pressed - standing, cells.loose])
         change = quantised(carved) - channels[5:7].astype(np.int64)
         change *= (np.abs(change) >= least).any(axis=0)
         channels[3], channels[4], channels[7:] = cells.pressed, cells.loose, cells.lowest
         channels[5:7] += change
         self._cells.write(window, channels)
-        shares = np.ones(len(steps))
-        if nearest is not None and cut is not None and cut.any():
-            shares = np.bincount(nearest.ravel(), cut.ravel(), len(steps)).astype(float)
-        shares = shares / shares.sum()
-        for number, (step, share) in enumerate(zip(steps, shares.tolist(), strict=True)):
-            step.at_rest = least == 1
-            step.cut += share * cells.cut_height
-            step.packed += share * cells.packed
-            step.unplaced += share * cells.unplaced
-            self._record(step, window, change if nearest is None else change * (nearest == number), frame)
-
-    @staticmethod
-    def _record(step: CarvedStep, window: Window, change: NDArray[np.int64], frame: float) -> None:
-        rows, columns = (np.flatnonzero(change.any(axis=(0, axis))) for axis in (2, 1))
-        if not len(rows):
-            return
-        part = Window(
-            window.column + int(columns[0]), window.row + int(rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
-        )
-        change = change[:, *window.slices(part)]
-        step.recorder.add(frame, part, change, np.zeros(change.shape[1:], bool))
+        self._tops.write(window, np.minimum(cells.pressed, cells.lowest.max(axis=0, keepdims=True)) + cells.loose)
+        step.at_rest = least == 1
+        step.cut += cells.cut_height
+        step.packed += cells.packed
+        step.unplaced += cells.unplaced
+        if (part := window.around_cells(change.any(axis=0))) is not None:
+            change = change[:, *window.slices(part)]
+            step.recorder.add(frame, part, change, np.zeros(change.shape[1:], bool))

@@ -158,7 +158,7 @@ class CarvedCells:
         """
         standing = np.minimum(self.pressed, self.lowest)
         depth = standing + self.loose - underside
-        least = np.where(self.closed, np.inf, np.where(self.contact, min(UNDER_SOLE, self.cell_size), TOLERANCE))
+        least = np.where(self.closed, np.inf, least_cut(self.contact, self.cell_size))
         depth = np.where(depth >= least, depth, 0.0)
         if not depth.any():
             return depth[0]
@@ -238,6 +238,11 @@ class CarvedCells:
         self.cut_height -= float(loose[fallen].sum())
         self.lowest[:, fallen] = (np.minimum(self.pressed, self.lowest) + loose)[:, fallen]
         self.loose = np.maximum(loose, 0.0)
+
+
+def least_cut(contact: Mask, cell_size: float) -> Array:
+    """Least depth in the ground that is cut, from the cells (rows, columns) under soles that press [m]."""
+    return np.where(contact, min(UNDER_SOLE, cell_size), TOLERANCE)
 
 
 def _middle(quarters: Array) -> Array:

@@ -24,7 +24,7 @@ from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
 from ..record.moved_carve import placement, shifted
 from ..record.record import BakeRecord, EditableStep
-from .carved_ground import CarvedGround, Part
+from .carved_ground import CarvedGround, Part, numbered
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
 from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
@@ -113,15 +113,14 @@ def carves_of(
         for body in bodies:
             yield
             around = next(body.poses)
-            low, parts = carving.low(around), body.parts(number)
+            parts = body.parts(number)
             for behind in body.behind(number):
                 carving.leave(behind)
-            for walls in dict.fromkeys(part.step.walls for part in parts):
-                if (passed := carving.drawn(parts, around, low, walls)) is not None:
-                    drawn.append(passed)
+            drawn += [passed for part in parts if (passed := carving.drawn(part, around)) is not None]
         for passed in drawn:
             yield
             carving.carve(passed, drawn, frame)
+        carving.slide(drawn, frame)
         carving.settle(drawn, frame)
     for step in steps.values():
         yield
@@ -166,7 +165,7 @@ class _Body:
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             if taken:
-                self._parts.append((sole, taken, _nearest(taken, skin.frames), triangles, sides))
+                self._parts.append((sole, taken, _nearest(taken, skin.frames), *numbered(triangles.T, len(places)), sides))
 
     def parts(self, number: int) -> list[Part]:
         """The step that each part is nearest to at a frame, with the part."""

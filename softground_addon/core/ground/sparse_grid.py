@@ -44,6 +44,14 @@ class Window(NamedTuple):
         """The window with `margin` more cells on every side."""
         return Window(self.column - margin, self.row - margin, self.columns + 2 * margin, self.rows + 2 * margin)
 
+    def around_cells(self, cells: Mask) -> Window | None:
+        """The smallest window that holds those of its cells (rows, columns) that are true; None if none is."""
+        rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return None
+        (first, last), (left, right) = ((int(of[0]), int(of[-1])) for of in (rows, columns))
+        return Window(self.column + left, self.row + first, right - left + 1, last - first + 1)
+
     def cells_under(self, x: Array, y: Array, cell_size: float) -> tuple[Indices, Indices]:
         """Rows and columns within the window of the cells under world positions [m]; beyond it, of the nearest."""
         column = np.floor(x / cell_size).astype(np.intp) - self.column

@@ -15,7 +15,7 @@ from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.places import Places, inside
 from ..ground.sparse_grid import Window
 from ..numerics import bilinear
-from ..numerics.arrays import Array, Indices
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief.steps import NOTHING, StepRelief
@@ -153,6 +153,10 @@ def movements_at(
     contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
     is_carved = np.array([not len(footprint.contact_cells) for footprint in footprints], dtype=bool)
+    moving = [
+        _moving(footprint, window) if carved else None
+        for footprint, window, carved in zip(footprints, reach, is_carved, strict=True)
+    ]
     for number, footprint in enumerate(footprints):
         of_step = [_NO_RAMPS]
         alike = is_carved == is_carved[number]
@@ -160,11 +164,12 @@ def movements_at(
         allowed = np.array([tolerance, SHADING_TOLERANCE])
         if is_carved[number]:
             allowed = np.maximum(allowed, CARVED_TOLERANCE)
-        for points, frames, moved in _movements(in_blocks[near[number]], places, kernels[footprint.cell_size]):
+        of_blocks = _movements(in_blocks[near[number]], places, kernels[footprint.cell_size], moving[number])
+        for points, frames, moved in of_blocks:
             shared = np.zeros(len(points))
             for other in together:
-                shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
-            margin, off = allowed / shared[:, None], np.zeros(len(points))
+                shared += _reached(reach[other], moving[other], footprints[other].cell_size, x[points], y[points])
+            margin, off = allowed / np.maximum(shared, 1.0)[:, None], np.zeros(len(points))
             if is_carved[number]:  # half of the tolerance for its ends
                 margin = margin / 2
                 shortened = _without_small_ends(moved, margin)
@@ -179,6 +184,28 @@ def movements_at(
         contacts.append(_point_contacts(footprint, places))
         yield
     return Movements(movements, joined(contacts), error)
+
+
+def _moving(footprint: Footprint, reach: Window) -> Mask:
+    """Cells of its reach (rows, columns) near which a footprint moves the ground, within as many cells as it is wider."""
+    window = footprint.window
+    moving = np.zeros((reach.rows, reach.columns), dtype=bool)
+    moves = moving[reach.slices(window)].reshape(-1)
+    for changes in (footprint.compression, footprint.rim):
+        moves[changes.cells[:]] = True
+    moving[reach.slices(window)] = moves.reshape(window.rows, window.columns)
+    for along in (moving, moving.T):
+        for _ in range(window.row - reach.row):
+            before = along.copy()
+            along[1:] |= before[:-1]
+            along[:-1] |= before[1:]
+    return moving
+
+
+def _reached(reach: Window, moving: Mask | None, cell_size: float, x: Array, y: Array) -> Mask:
+    """True at places (N,) that a footprint moves: all in its reach, or those in its moving cells."""
+    within = inside(reach, cell_size, x, y)
+    return within if moving is None else within & moving[reach.cells_under(x, y, cell_size)]
 
 
 def _without_small_ends(moved: Array, margin: Array) -> Array:
@@ -217,8 +244,10 @@ def _span(footprint: Footprint) -> tuple[float, float]:
     return float(frames.min()) - footprint.frame_step, float(frames.max())
 
 
-def _movements(in_blocks: ChangesInBlocks, places: Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
-    """Displayed height and compression of the places that a footprint moves, block by block.
+def _movements(
+    in_blocks: ChangesInBlocks, places: Places, kernel: Array, moving: Mask | None
+) -> Iterator[tuple[Indices, Array, Array]]:
+    """Displayed height and compression of the places that a footprint moves, block by block; see `_reached`.
 
     Yields
     ------
@@ -229,8 +258,10 @@ def _movements(in_blocks: ChangesInBlocks, places: Places, kernel: Array) -> Ite
         Change of height, and compression, by this footprint alone [m]; 0 at the first frame.
     """
     footprint = in_blocks.footprint
-    for part in _blocks(footprint.window.expanded(_margin(kernel))):
+    reach = footprint.window.expanded(_margin(kernel))
+    for part in _blocks(reach):
         points = places.within(part, footprint.cell_size)
+        points = points[_reached(reach, moving, footprint.cell_size, places.x[points], places.y[points])]
         if not len(points):
             continue
         block = places.window(points, footprint.cell_size)

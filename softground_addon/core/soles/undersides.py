@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.arrays import Array
-from ..numerics.triangles import SLACK, cross
+from ..numerics.triangles import SLACK
 
 SUPERSAMPLING = 4
 """Samples per node along each axis; edges are then known to a few per cent of the node distance."""
 
-_PAIR_BLOCK = 2_000_000
-"""Triangle-sample pairs handled at once, to bound memory."""
+_TRIANGLE_BLOCK, _PAIR_BLOCK = 1 << 12, 1 << 14
+"""Triangles, and pairs of these and samples, that are handled at once: as many as the processor's cache holds."""
+
+_DISTANCE_BLOCK = 2_000_000
+"""Pairs of nodes whose distances are known at once, to bound memory."""
 
 _UPRIGHT = 1e-12
 """Triangles that cover less than this are upright, in squares of the node distance."""
@@ -77,75 +80,75 @@ def lowest_surface(
     Upright triangles have no underside and are left out.
     """
     rows, columns = shape
-    places = (vertices[:, :2] - origin) / spacing
-    first, last = _nodes_within(places, triangles, (columns, rows))
-    holds = np.flatnonzero((first[:, 0] <= last[:, 0]) & (first[:, 1] <= last[:, 1]))  # few triangles of a fine mesh
-    triangles, first, last = triangles[holds], first[holds], last[holds]
-    flat = places[triangles]
-    lying = np.abs(cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
-    heights, flat, first, last = vertices[triangles[lying], 2], flat[lying], first[lying], last[lying]
-    size = last - first + 1
-    count = size.prod(axis=1)
-    order = np.cumsum(count)
-
+    *across, up = np.ascontiguousarray(vertices.T)
+    x_of, y_of = ((along - start) / spacing for along, start in zip(across, origin, strict=True))
     buffer = np.full(rows * columns, np.inf)
-    start = 0
-    while start < len(heights):
-        done = order[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
-        block = slice(start, stop)
-        _draw(buffer, columns, flat[block], heights[block], first[block], size[block], count[block])
-        start = stop
+    for start in range(0, len(triangles), _TRIANGLE_BLOCK):
+        corners = np.ascontiguousarray(triangles[start : start + _TRIANGLE_BLOCK].T)
+        x, y = x_of.take(corners), y_of.take(corners)
+        (left, right), (low, high) = _nodes_within(x, columns), _nodes_within(y, rows)
+        lying = np.abs((x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])) > _UPRIGHT
+        holds = np.flatnonzero((left <= right) & (low <= high) & lying)  # few triangles of a fine mesh
+        places = np.stack([x.take(holds, axis=1), y.take(holds, axis=1), up.take(corners.take(holds, axis=1))])
+        first = left.take(holds), low.take(holds)
+        size = right.take(holds) - first[0] + 1, high.take(holds) - first[1] + 1
+        order = np.cumsum(size[0] * size[1])
+        begin = 0
+        while begin < len(holds):
+            done = order[begin - 1] if begin else 0
+            end = max(begin + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
+            block = slice(begin, end)
+            _draw(
+                buffer, columns, places[..., block], *((of_column[block], of_row[block]) for of_column, of_row in (first, size))
+            )
+            begin = end
     return buffer.reshape(shape)
 
 
-def _nodes_within(
-    places: Array, triangles: NDArray[np.intp], nodes: tuple[int, int]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First and last column and row of the nodes in the box around each triangle, (T, 2) each."""
-    first, last = np.empty((2, len(triangles), 2), dtype=np.int32)
-    a, b, c = np.ascontiguousarray(triangles.T)
-    for axis, (count, along) in enumerate(zip(nodes, places.T, strict=True)):
-        after = np.clip(np.ceil(along), 0, count).astype(np.int32)
-        before = np.clip(np.floor(along), -1, count - 1).astype(np.int32)
-        np.minimum(np.minimum(after.take(a), after.take(b)), after.take(c), out=first[:, axis])
-        np.maximum(np.maximum(before.take(a), before.take(b)), before.take(c), out=last[:, axis])
-    return first, last
+def _nodes_within(along: Array, nodes: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and last of the nodes along an axis in the box around each triangle (3, T), (T,) each."""
+    a, b, c = along
+    first = np.clip(np.ceil(np.minimum(np.minimum(a, b), c)), 0, nodes)
+    last = np.clip(np.floor(np.maximum(np.maximum(a, b), c)), -1, nodes - 1)
+    return first.astype(np.intp), last.astype(np.intp)
 
 
 def _draw(
     buffer: Array,
     columns: int,
-    flat: Array,
-    z: Array,
-    first: NDArray[np.intp],
-    size: NDArray[np.intp],
-    count: NDArray[np.intp],
+    places: Array,
+    first: tuple[NDArray[np.intp], NDArray[np.intp]],
+    size: tuple[NDArray[np.intp], NDArray[np.intp]],
 ) -> None:
-    """Lower the buffer to a block of triangles, all pairs of triangle and covered node at once."""
+    """Lower the buffer to triangles (x y z, corner, T), all pairs of triangle and node in its box at once."""
     # Barycentric coordinates and height are linear over the nodes of a triangle's box: at its first node, and per step.
-    a, b, c = (flat[:, corner] for corner in range(3))
-    (along_b, up_b), (along_c, up_c) = (b - a).T, (c - a).T
+    a, b, c = places.swapaxes(0, 1)
+    (along_b, up_b, rise_b), (along_c, up_c, rise_c) = b - a, c - a
     determinant = along_b * up_c - up_b * along_c
-    x, y = (first - a).T
+    x, y = first[0] - a[0], first[1] - a[1]
     v = np.array([x * up_c - y * along_c, up_c, -along_c]) / determinant
     w = np.array([along_b * y - up_b * x, -up_b, along_b]) / determinant
-    height = v * (z[:, 1] - z[:, 0]) + w * (z[:, 2] - z[:, 0])
-    height[0] += z[:, 0]
+    height = v * rise_b + w * rise_c
+    height[0] += a[2]
 
-    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    row, column = np.divmod(within, np.repeat(size[:, 0], count))
+    count = size[0] * size[1]
+    of = np.repeat(np.arange(len(count)), count)
+    within = np.arange(len(of)) - (np.cumsum(count) - count).take(of)
+    wide = size[0].take(of)
+    row = within // wide
+    column = within - row * wide
 
-    def over(at_first: Array, per_column: Array, per_row: Array) -> Array:
-        values: Array = np.repeat(at_first, count)
-        values += np.repeat(per_column, count) * column
-        values += np.repeat(per_row, count) * row
+    def over(linear: Array, of: NDArray[np.intp], column: NDArray[np.intp], row: NDArray[np.intp]) -> Array:
+        values: Array = linear[0].take(of)
+        values += linear[1].take(of) * column
+        values += linear[2].take(of) * row
         return values
 
-    part_b, part_c = over(*v), over(*w)
+    part_b, part_c = over(v, of, column, row), over(w, of, column, row)
     covered = np.flatnonzero((part_b >= -SLACK) & (part_c >= -SLACK) & (part_b + part_c <= 1 + SLACK))
-    index = np.repeat(first[:, 1] * columns + first[:, 0], count) + row * columns + column
-    np.minimum.at(buffer, index[covered], over(*height)[covered])
+    of, column, row = of.take(covered), column.take(covered), row.take(covered)
+    index = (first[1] * columns + first[0]).take(of) + row * columns + column
+    np.minimum.at(buffer, index, over(height, of, column, row))
 
 
 def continue_outside(heights: Array) -> Array:
@@ -180,7 +183,7 @@ def _spread_nearest(heights: Array, known: NDArray[np.bool_]) -> Array:
     source = np.argwhere(known & ~enclosed)  # of the enclosed ones none is the nearest
     target = np.argwhere(~known)
     filled = heights.copy()
-    block = max(1, _PAIR_BLOCK // max(len(source), 1))
+    block = max(1, _DISTANCE_BLOCK // max(len(source), 1))
     for first in range(0, len(target), block):
         part = target[first : first + block]
         nearest = ((part[:, None] - source) ** 2).sum(axis=-1).argmin(axis=1)
