@@ -17,7 +17,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
@@ -268,8 +267,8 @@ def write_prints(
         del pressed
         findings: list[Finding] = []
         if shot.surface is None:
-            assert shot.plan is not None
-            place = yield from _created(drafts, scene, wanted, shot.plan, trail)
+            assert shot.layout is not None
+            place = yield from _created(drafts, scene, wanted, shot.layout, trail)
             record.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
@@ -282,11 +281,10 @@ def write_prints(
 
 
 def _created(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan, trail: Trail
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, layout: created_ground.Layout, trail: Trail
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
-    creating = created_ground.created(drafts, wanted, plan)
-    name, layout = yield from meanwhile(Progress("write", 0.1), creating)
+    name = yield from meanwhile(Progress("write", 0.1), created_ground.created(drafts, wanted, layout))
     yield Progress("write", 0.1)
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)

@@ -203,6 +203,8 @@ def _shown_by(
     """
     shown, sigma, inputs = Progress("write", 0.3), made_with.material.blur_sigma, made_with.inputs()
     compared, strength = (tuple(map(id, footprints)), x, y, sigma), inputs.pop("relief_strength")
+    for name in ("ground", "camera"):  # the second bake has that which the first has made
+        del inputs[name]
 
     def relief_of() -> Job[tuple[Sequence[Footprint], list[StepRelief]]]:
         full = {**inputs, "relief_strength": 1.0}
