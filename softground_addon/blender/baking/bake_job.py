@@ -41,6 +41,7 @@ from ..reading import staleness
 from ..reading.shots import Shot, read_shot, settings_of
 from ..remedies import worded
 from ..response import response_job
+from ..reuse import reused
 from ..weather import ground_weather as weather
 from ..weather.weather_keys import WeatherBefore
 from . import bake_report, step_soles
@@ -258,13 +259,16 @@ def write_prints(
         Of the shortest sole [m].
     """
     weather_before = weather.before(settings.resolve(wanted.ground)) if wanted.ground else WeatherBefore()
-    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+    now, footprints, moment = Progress("write", 0.05), record.shaping, at_the_end(wanted)
+
+    def trail_of() -> Job[tuple[list[Footprint], Trail]]:
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        pressing = PressedGround.at.slices(record.shaping, **at_the_end(wanted))
-        pressed = yield from meanwhile(Progress("write", 0.05), pressing)
-        yield Progress("write", 0.05)
-        trail = pressed.trail(trail_detail.FLOOR)
-        del pressed
+        pressed = yield from meanwhile(now, PressedGround.at.slices(footprints, **moment))
+        yield now
+        return footprints, pressed.trail(trail_detail.FLOOR)
+
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
         findings: list[Finding] = []
         if shot.surface is None:
             assert shot.layout is not None

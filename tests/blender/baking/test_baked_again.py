@@ -138,7 +138,7 @@ def test_edits_of_steps_have_them_pressed_anew_and_come_with_the_bake(again):
     assert baked_ground.record_of(ground).edited[0].compressed_m3 == half.compressed_m3
 
 
-PRINTED = {"prints", "findings", "movements", "relief"}
+PRINTED = {"prints", "findings", "trail", "movements", "relief"}
 """What follows from other prints."""
 
 
