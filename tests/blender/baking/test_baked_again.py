@@ -2,7 +2,7 @@
 
 import bpy
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.blender import jobs, reuse
@@ -86,6 +86,7 @@ def record_in(scene):
 
 
 @settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@example([("preset", 1), ("relief", 3)])  # water, and then none
 @given(st.lists(st.tuples(st.sampled_from(sorted(CHANGES)), st.integers(1, 4)), min_size=2, max_size=4))
 def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, changes):
     scene = opened_as(baked_walk)
