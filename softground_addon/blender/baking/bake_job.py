@@ -17,7 +17,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.composers.ground_plan import GroundPlan
 from ...core.composers.pressed_shot import edit_findings
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
@@ -42,6 +41,7 @@ from ..reading import staleness
 from ..reading.shots import Shot, read_shot, settings_of
 from ..remedies import worded
 from ..response import response_job
+from ..reuse import reused
 from ..weather import ground_weather as weather
 from ..weather.weather_keys import WeatherBefore
 from . import bake_report, step_soles
@@ -259,17 +259,20 @@ def write_prints(
         Of the shortest sole [m].
     """
     weather_before = weather.before(settings.resolve(wanted.ground)) if wanted.ground else WeatherBefore()
-    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+    now, footprints, moment = Progress("write", 0.05), record.shaping, at_the_end(wanted)
+
+    def trail_of() -> Job[tuple[list[Footprint], Trail]]:
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        pressing = PressedGround.at.slices(record.shaping, **at_the_end(wanted))
-        pressed = yield from meanwhile(Progress("write", 0.05), pressing)
-        yield Progress("write", 0.05)
-        trail = pressed.trail(trail_detail.FLOOR)
-        del pressed
+        pressed = yield from meanwhile(now, PressedGround.at.slices(footprints, **moment))
+        yield now
+        return footprints, pressed.trail(trail_detail.FLOOR)
+
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
         findings: list[Finding] = []
         if shot.surface is None:
-            assert shot.plan is not None
-            place = yield from _created(drafts, scene, wanted, shot.plan, trail)
+            assert shot.layout is not None
+            place = yield from _created(drafts, scene, wanted, shot.layout, trail)
             record.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
@@ -282,11 +285,10 @@ def write_prints(
 
 
 def _created(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan, trail: Trail
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, layout: created_ground.Layout, trail: Trail
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
-    creating = created_ground.created(drafts, wanted, plan)
-    name, layout = yield from meanwhile(Progress("write", 0.1), creating)
+    name = yield from meanwhile(Progress("write", 0.1), created_ground.created(drafts, wanted, layout))
     yield Progress("write", 0.1)
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)

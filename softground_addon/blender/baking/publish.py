@@ -23,7 +23,7 @@ from ...core.plants.tramplings import Tramplings, tramplings
 from ...core.playback.playback_curves import playback_curves_at
 from ...core.playback.vertex_histories import Movements
 from ...core.record.footprints import Footprint
-from ...core.record.pressed_ground import sample_at
+from ...core.record.pressed_ground import GroundSample, sample_at
 from ...core.record.record import BakeRecord, dump
 from ...core.relief.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
@@ -131,9 +131,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
     footprints = record.shaping
     stored = yield from meanwhile(Progress("write", 0.2), dump.slices(record))
     x, y = place.position[:, 0], place.position[:, 1]
-    moment = at_the_end(made_with)
-    sample = yield from meanwhile(Progress("write", 0.25), sample_at.slices(footprints, x, y, **moment))
-    relief, known = yield from _shown_by(footprints, x, y, made_with)
+    sample, relief, known = yield from _shown_by(footprints, x, y, made_with)
     if relief:
         sample = sample.with_relief(*all_together(relief, len(x)).T)
     over_time = playback_curves_at.slices(
@@ -196,28 +194,30 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
 
 def _shown_by(
     footprints: Sequence[Footprint], x: Array, y: Array, made_with: BakeSettings
-) -> Job[tuple[list[StepRelief], list[Movements]]]:
-    """Relief of footprints at places, and what is known of their movements there.
+) -> Job[tuple[GroundSample, list[StepRelief], list[Movements]]]:
+    """The ground at places in the end, without relief; relief of footprints there, and what is known of movements.
 
-    Both are held with the footprints, which are compared by their identity: those of a bake never change.
+    All is held with the footprints, which are compared by their identity: those of a bake never change.
     """
     shown, sigma, inputs = Progress("write", 0.3), made_with.material.blur_sigma, made_with.inputs()
+    moment = at_the_end(made_with)
     compared, strength = (tuple(map(id, footprints)), x, y, sigma), inputs.pop("relief_strength")
+    for name in ("ground", "camera"):  # the second bake has that which the first has made
+        del inputs[name]
 
     def relief_of() -> Job[tuple[Sequence[Footprint], list[StepRelief]]]:
         full = {**inputs, "relief_strength": 1.0}
         work = relief_at.slices(footprints, x, y, full, blur_sigma=sigma)
         return footprints, (yield from meanwhile(shown, work))
 
-    def movements_of() -> Job[tuple[Sequence[Footprint], list[Movements]]]:
-        yield shown
-        return footprints, []
+    def bare() -> Job[tuple[Sequence[Footprint], GroundSample, list[Movements]]]:
+        return footprints, (yield from meanwhile(shown, sample_at.slices(footprints, x, y, **moment))), []
 
-    _, known = yield from reused(shown, "movements", compared, movements_of())
+    _, sample, known = yield from reused(shown, "movements", (compared, moment), bare())
     if not strength > 0:
-        return [], known
+        return sample, [], known
     _, relief = yield from reused(shown, "relief", (compared, inputs), relief_of())
-    return [step.scaled(strength) for step in relief], known
+    return sample, [step.scaled(strength) for step in relief], known
 
 
 def _trampled(footprints: Sequence[Footprint], made_with: BakeSettings) -> Job[Tramplings | None]:

@@ -18,6 +18,7 @@ from ...core.events.events import Event, as_edited, events, in_order
 from ...core.files import report
 from ...core.findings import Finding
 from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.heightfield import FlatTerrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.estimate import CharacterLoads, follows_landings
@@ -68,16 +69,17 @@ class ShotPrints:
     ----------
     grounds : tuple of GroundPrints
         Those of each ground.
-    findings : tuple of Finding
-        What checks say of them.
     reported : mapping
         Offsets, forces and gaps, for the report.
+    findings : tuple of Finding
+        What checks say of them.
     """
 
     grounds: tuple[GroundPrints, ...]
+    loads: list[CharacterLoads]
     responses: list[CharacterResponse]
-    findings: tuple[Finding, ...]
     reported: Mapping[str, Any]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def steps(self) -> list[tuple[EditableStep, str]]:
@@ -108,17 +110,26 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
-    if not isinstance(shot.terrain, MeshTerrain):  # what is made or hard is not compared, nor are several grounds
-        return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits))
+    if not isinstance(shot.terrain, MeshTerrain | FlatTerrain):  # slopes, hard and several grounds are not compared
+        prints = yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits)
+        return (yield from _checked(wanted, shot, prints))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, shot.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
     stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
+    name, *_ = (
+        settings.pop(key, None) for settings, key in ((before, "ground"), (after, "camera"), (after, "margin_m"))
+    )
     painted = shot.variation, shot.regions(wanted)  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, edits)
     prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing)
-    return replace(prints, grounds=(replace(prints.grounds[0], made_with=wanted),))  # those before may write otherwise
+    prints = replace(
+        prints, grounds=(replace(prints.grounds[0], made_with=wanted),)
+    )  # those before may write otherwise
+    # What is reported of them is held with them: nothing else has its identity meanwhile.
+    checked = yield from reused(begun, "findings", (id(prints.reported), name), _checked(wanted, shot, prints))
+    return replace(prints, findings=checked.findings)
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
@@ -135,18 +146,21 @@ def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str
     prints: list[GroundPrints] = []
     for each in zip(wanted.of_each_ground, shot.of_each_ground, grounds, strict=True):
         prints.append((yield from _of_ground(shot, pressed, len(prints), *each)))
-    records, footprints = [each.record for each in prints], [step for each in prints for step in each.record.footprints]
+    records = [each.record for each in prints]
     measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, records)
     gaps = yield from meanwhile(at_end, measuring)
+    reported = {"offsets_mm": offsets_mm(pressed.loads), "forces": pressed.forces, "gaps_mm": gaps}
+    return ShotPrints(tuple(prints), pressed.loads, pressed.responses, reported)
+
+
+def _checked(wanted: BakeSettings, shot: Shot, prints: ShotPrints) -> Job[ShotPrints]:
+    """Prints with what checks say of them and name their grounds."""
+    footprints = [step for each in prints.grounds for step in each.record.footprints]
     names = "', '".join(ground.name for ground in wanted.soft_grounds) or "the ground"
-    checking = self_check.slices(pressed.loads, footprints, shot.terrain, wanted.cell_size_m, names)
-    findings = yield from meanwhile(at_end, checking)
-    return ShotPrints(
-        tuple(prints),
-        pressed.responses,
-        (*findings, *(finding for each in prints for finding in _bottomed_out(each))),
-        {"offsets_mm": offsets_mm(pressed.loads), "forces": pressed.forces, "gaps_mm": gaps},
-    )
+    checking = self_check.slices(prints.loads, footprints, shot.terrain, wanted.cell_size_m, names)
+    findings = yield from meanwhile(Progress("simulate", 1.0), checking)
+    findings += [finding for each in prints.grounds for finding in _bottomed_out(each)]
+    return replace(prints, findings=tuple(findings))
 
 
 def _of_ground(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
+from ...core.ground.heightfield import FlatTerrain
 from ...core.ground.material import GroundMaterial
 from ...core.meshing.face_edges import face_edges
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
@@ -60,9 +61,16 @@ class Layout:
     face_size: NDArray[np.intp]
     frame: GroundFrame | None = None
 
+    @property
+    def plane(self) -> FlatTerrain:
+        """The terrain of a level one."""
+        low, high = (tuple(corner(self.vertices[:, :2], axis=0).tolist()) for corner in (np.min, np.max))
+        return FlatTerrain(float(self.vertices[0, 2]), low, high)
 
-def created(drafts: ExitStack, wanted: BakeSettings, plan: GroundPlan) -> Slices[tuple[ObjectName, Layout]]:
-    """A draft of a ground for a plan: with its margin, and fine where the camera comes close; its material is there."""
+
+@sliced
+def laid_out(wanted: BakeSettings, plan: GroundPlan) -> Slices[Layout]:
+    """The layout of a ground for a plan: with its margin, and fine where the camera comes close."""
     layout = yield from lay_out.slices(
         plan.widened(wanted.margin_m, wanted.camera),
         wanted.cell_size_m,
@@ -70,11 +78,14 @@ def created(drafts: ExitStack, wanted: BakeSettings, plan: GroundPlan) -> Slices
         reach=reach_of(wanted.material),
         close_up=_close_up(wanted, plan),
     )
-    layout = replace(layout, frame=wanted.frame)
-    yield
+    return replace(layout, frame=wanted.frame)
+
+
+def created(drafts: ExitStack, wanted: BakeSettings, layout: Layout) -> Slices[ObjectName]:
+    """A draft of a ground that is laid out; its material is there."""
     drafts.enter_context(drafted(wanted.surface))
     yield
-    return (yield from draft.slices(drafts, layout, soft_edge(wanted.margin_m))), layout
+    return (yield from draft.slices(drafts, layout, soft_edge(wanted.margin_m)))
 
 
 def soft_edge(margin: float) -> float:

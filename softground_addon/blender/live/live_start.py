@@ -78,7 +78,8 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
 
     if wanted.ground is None:
         assert shot.plan is not None
-        name, layout = yield from meanwhile(PLACING, created_ground.created(drafts, wanted, shot.plan))
+        layout = yield from meanwhile(PLACING, created_ground.laid_out.slices(wanted, shot.plan))
+        name = yield from meanwhile(PLACING, created_ground.created(drafts, wanted, layout))
         looking = ground_surface.pressed_vertices.slices(layout.vertices, is_near, shot.terrain)
         index = yield from meanwhile(PLACING, looking)
         return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)

@@ -181,8 +181,9 @@ class SOFTGROUND_OT_create_ground(Reading):
         wanted = shots.settings_of(scene)
         plan = yield from shots.fit_ground(scene, wanted)
         with ExitStack() as drafts:
-            creating = created_ground.created(drafts, wanted, plan)
-            name, _ = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), creating)
+            now = jobs.Progress("sample", 1.0)
+            layout = yield from jobs.meanwhile(now, created_ground.laid_out.slices(wanted, plan))
+            name = yield from jobs.meanwhile(now, created_ground.created(drafts, wanted, layout))
             ground = settings.resolve(name)
             with analysis.own_changes(scene):
                 before = options.ground

@@ -69,5 +69,7 @@ def attribute(mesh: bpy.types.Mesh, name: str, kind: str) -> Any:
 
 def remove(mesh: bpy.types.Mesh, names: Iterable[str]) -> None:
     """Take away attributes of these names that a bake has made."""
-    for name in made(mesh).intersection(names):
+    for name in (unwanted := made(mesh).intersection(names)):
         mesh.attributes.remove(mesh.attributes[name])
+    if unwanted:
+        mesh[MADE] = "\n".join(sorted(made(mesh)))

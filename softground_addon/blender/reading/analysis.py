@@ -142,7 +142,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     analysis = yield from refreshing(scene)
     if analysis is None:
         wanted = settings_of(scene)
-        shot = yield from read_shot(scene, replace(wanted, response=None))
+        shot = replace((yield from read_shot(scene, replace(wanted, response=None))), layout=None)  # which is large
         source, hashes = _source(scene.softground.ground, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
         _tell_of_changes(scene.view_layers)  # response layers were switched off and on again, which is no edit

@@ -15,11 +15,11 @@ from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.hard_ground import HardOnSoft, soft_ground
-from ...core.ground.heightfield import Terrain
+from ...core.ground.heightfield import FlatTerrain, Terrain
 from ...core.ground.regions import MOST as MOST_KINDS
 from ...core.ground.regions import Regions
 from ...core.ground.soft_ground import SoftGround
-from ...core.ground.terrain import MeshTerrain
+from ...core.ground.terrain import MeshTerrain, plane_of
 from ...core.ground.variation import PaintedSurface
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads
@@ -32,7 +32,7 @@ from ...core.weather.felt_weather import weathering_of
 from .. import ground_slots, setting_paths, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
 from ..characters.import_fixes import size_of
-from ..ground import ground_checks, ground_surface, painted_ground
+from ..ground import created_ground, ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..response.character_keys import ReadRig, controls_of
@@ -58,6 +58,8 @@ class Shot:
         Around all paths of the soles [m].
     plan : GroundPlan or None
         The ground that fits the walk, where the scene has none.
+    layout : Layout or None
+        That of it.
     surface : GroundSurface or None
         The scene's ground, if it has one.
     terrain : Terrain
@@ -83,6 +85,7 @@ class Shot:
     findings: tuple[Finding, ...] = ()
     frame: GroundFrame | None = None
     parts: tuple[Shot, ...] = ()
+    layout: created_ground.Layout | None = None
 
     @property
     def of_each_ground(self) -> tuple[Shot, ...]:
@@ -177,9 +180,11 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        bounds = np.stack([lower, upper])
-        terrain, _, missing = yield from _with_hard(scene, wanted, motions, [plan.terrain], bounds)
-        return Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
+        layout = yield from meanwhile(Progress("sample", 1.0), created_ground.laid_out.slices(wanted, plan))
+        plane = layout.plane if isinstance(plan.terrain, FlatTerrain) else plan.terrain
+        terrain, _, missing = yield from _with_hard(scene, wanted, motions, [plane], np.stack([lower, upper]))
+        made = Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
+        return replace(made, layout=layout)
     yield Progress("sample", 1.0)
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
@@ -201,7 +206,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
     return replace(shot, parts=tuple(parts))
 
 
-def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, MeshTerrain, list[MeshTerrain]]]:
+def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, Terrain, list[MeshTerrain]]]:
     """The surface of the ground of the settings, and what of it is soft and is hard within bounds in the plane [m]."""
     assert wanted.ground
     now, ground = Progress("sample", 1.0), settings.resolve(wanted.ground)
@@ -209,6 +214,11 @@ def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, 
     of_slots = wanted.kinds[1]
     looking = ground_surface.undisturbed_surface.slices(ground, wanted.unit_scale_m, painted, of_slots, wanted.frame)
     surface = yield from meanwhile(now, looking)
+    if not wanted.grounds and surface.factors is None and surface.kinds is None:
+        plane = yield from meanwhile(now, plane_of.slices(surface.surface_vertices, surface.triangles))
+        if plane and (bounds[1] >= plane.low).all() and (bounds[0] <= plane.high).all():
+            # As of a ground that was made, whose prints the next bake then takes over.
+            return surface, plane, []
     binning = ground_surface.terrain_of.slices(surface, bounds, is_one_of_several=bool(wanted.grounds))
     name = surface.name if wanted.grounds else ""
     soft = yield from reused(now, "terrain", (surface, bounds), meanwhile(now, binning), of=name)

@@ -28,21 +28,27 @@ class Terrain(Protocol):
         ...
 
 
+@dataclass(frozen=True)
 class FlatTerrain:
-    """An endless horizontal plane.
+    """A horizontal plane, endless or a rectangle.
 
-    Parameters
+    Attributes
     ----------
     height : float
         Its height [m].
+    low, high : (float, float)
+        Corners of the rectangle [m].
     """
 
-    def __init__(self, height: float = 0.0) -> None:
-        self.height = height
+    height: float = 0.0
+    low: tuple[float, float] = (-np.inf, -np.inf)
+    high: tuple[float, float] = (np.inf, np.inf)
 
     def heights(self, x: Array, y: Array) -> Array:
-        """Heights at world positions [m]."""
-        return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), float(self.height))
+        """Heights at world positions [m], NaN beyond the rectangle."""
+        (left, near), (right, far) = self.low, self.high
+        inside = (x >= left) & (x <= right) & (y >= near) & (y <= far)
+        return np.where(inside, float(self.height), np.nan)
 
 
 class SlopingTerrain:

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..numerics.triangles import barycentric, enumerated
+from .heightfield import FlatTerrain
 
 UPWARD = 0.05
 """Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
@@ -29,8 +30,42 @@ PLACES_AT_ONCE = 1 << 14
 SLACK = 1e-8
 """By which a triangle's box is wider than it, over its size: more than that of `triangles.barycentric`."""
 
+MOST_OF_PLANE = 1 << 19
+"""Triangles of a mesh that may be taken for a plane, at most: it takes longer to tell than it saves."""
+
 SAME_LAYER = 1e-3
 """Surfaces over one place that are closer than this are one [m]."""
+
+
+@sliced
+def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
+    """The plane of a mesh that is a level rectangle along the axes without a hole; None of any other.
+
+    Every edge that is not on its sides is that of two triangles: so as many of them cover one place as any other, and
+    they do not turn over.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+        World positions [m].
+    triangles : (T, 3) int array
+        Corners of each triangle.
+    """
+    if not 0 < len(triangles) <= MOST_OF_PLANE or np.ptp(vertices[:, 2]) > 0:
+        return None
+    place = vertices[:, :2]
+    low, high = place.min(axis=0), place.max(axis=0)
+    to_second, to_third = np.diff(place[triangles], axis=1).swapaxes(0, 1)
+    turn = to_second[:, 0] * to_third[:, 1] - to_second[:, 1] * to_third[:, 0]
+    if not (turn > 0).all():
+        return None
+    yield
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, first, count = np.unique(edges @ (len(vertices), 1), return_index=True, return_counts=True)
+    begin, end = place[edges[first[count != 2]]].swapaxes(0, 1)
+    if not ((begin == end) & ((begin == low) | (begin == high))).any(axis=1).all():
+        return None
+    return FlatTerrain(float(vertices[0, 2]), tuple(low.tolist()), tuple(high.tolist()))
 
 
 @dataclass(frozen=True)

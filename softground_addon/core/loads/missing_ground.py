@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.hard_ground import HardOnSoft, bare
-from ..ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
+from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array, Mask
@@ -70,8 +70,6 @@ class LevelBeyondEdge:
 
 def beyond_edge(motion: CharacterMotion, terrain: Terrain) -> Terrain:
     """The ground, level from its edges on where some sole of a motion is beyond them."""
-    if isinstance(terrain, FlatTerrain | SlopingTerrain):  # they are endless
-        return terrain
     steps = np.arange(0, len(motion.frames), EVERY)
     places = np.concatenate([spots(sole, steps).reshape(-1, 2) for sole in motion.soles])
     known = np.isfinite(terrain.heights(*places.T))

@@ -14,7 +14,7 @@ from .amounts import Amounts, Chunks
 from .drag import Drag, drags_of
 from .lattice_noise import cells, noise, uniform
 from .layers import MM, Around
-from .print_shape import CORE, PrintShape, shape_of
+from .print_shape import BETWEEN, CORE, PrintShape, shape_of
 from .scattered_crumbs import ScatteredCrumbs, scattered
 from .tread import GROOVE, LENGTH, SoleTread, Under
 
@@ -72,6 +72,8 @@ class PrintRelief:
         Its height over that of the amounts.
     drags : sequence of Drag
         Where the sole slid.
+    in_raster : bool
+        True if it is shown at centres of squares as large as the finest size: then it is worked out once for both.
 
     Attributes
     ----------
@@ -88,6 +90,8 @@ class PrintRelief:
         tread: SoleTread | None = None,
         tread_strength: float = 1.0,
         drags: Sequence[Drag] = (),
+        *,
+        in_raster: bool = False,
     ) -> None:
         self._shape, self._amounts, self._seed = shape, amounts, seed
         self._finest = finest * NEARLY
@@ -97,14 +101,17 @@ class PrintRelief:
         self._drags = drags
         self._wider, self._deeper, self._level, self._part = 0.0, 0.0, -np.inf, 1.0
         self.crumbs: list[ScatteredCrumbs] = []
-        x, y = shape.moved(shape.cell_size)
-        if len(x) < CELLS_FOR_VOLUME:
-            x, y = shape.moved(finest)
-        places = self._look_up(x, y)
+        self._raster = shape.moved(shape.cell_size)
+        if len(self._raster.x) < CELLS_FOR_VOLUME or in_raster:
+            self._raster = shape.moved(finest)
+        places = self._look_up(self._raster.x, self._raster.y)
         self._wider = self._widening(places)
-        self.crumbs = self._crumbs(x, y)
-        self._deeper = self._balance(places)
-        self._level = self._water_level(places)
+        rebuilt = self._rebuilt(places, self._wider)
+        self.crumbs = self._crumbs(places, rebuilt[2])
+        made = self._made(places, rebuilt)
+        self._deeper = self._balance(places, made)
+        self._level = self._water_level(places, made)
+        self._at_raster = self._relief(places, made)
 
     @property
     def has_tread(self) -> bool:
@@ -113,21 +120,23 @@ class PrintRelief:
 
     def at(self, x: Array, y: Array) -> Relief:
         """The relief at world places (N,)."""
-        moves = np.flatnonzero(self._shape.moves(x, y))
-        moved = self._relief(self._look_up(x[moves], y[moves]))
-        whole = np.zeros((4, len(x)))
-        whole[:, moves] = moved.height, moved.compression, moved.water, moved.pressed
+        number, whole = self._raster.numbers(x, y), np.zeros((4, len(x)))
+        whole[:, number >= 0] = self._at_raster[:, number[number >= 0]]
+        others = np.flatnonzero(number == BETWEEN)
+        moves = others[self._shape.moves(x[others], y[others])]
+        if len(moves):
+            places = self._look_up(x[moves], y[moves])
+            whole[:, moves] = self._relief(places, self._made(places, self._rebuilt(places, self._wider)))
         return Relief(*whole)
 
-    def _balance(self, places: _Places) -> float:
+    def _balance(self, places: _Places, made: _Made) -> float:
         """Deepening that keeps the print's volume, over its depth; layers that ask for more than `MOST_VOLUME` are
         lowered: no print throws up more than it has pressed."""
-        whole = self._relief(places)
-        weight = max(float((places.fade * whole.pressed * places.floor).sum()), 1e-12)
-        asked = float(whole.height.sum()) / weight
+        weight = max(float((places.fade * made.pressed * places.floor).sum()), 1e-12)
+        of_wall, whole = made.height.sum() / weight, self._relief(places, made)[0].sum() / weight
+        asked = float(whole)
         possible = float(np.clip(asked, -MOST_VOLUME, MOST_VOLUME))
         if possible != asked:
-            of_wall = float(self._rebuilt(places, self._wider)[0].sum()) / weight
             self._part = float(np.clip((possible - of_wall) / (asked - of_wall), 0.0, 1.0))
             asked = of_wall + self._part * (asked - of_wall)
         return float(np.clip(asked, -MOST_VOLUME, MOST_VOLUME))
@@ -142,19 +151,19 @@ class PrintRelief:
         limit = self._amounts.wall * MM
         return float(np.clip(-excess / growth, -limit, limit)) if growth < 0 else 0.0
 
-    def _crumbs(self, x: Array, y: Array) -> list[ScatteredCrumbs]:
-        """The crumbs within all places of its window (N,)."""
+    def _crumbs(self, places: _Places, pressed: Array) -> list[ScatteredCrumbs]:
+        """The crumbs about the print, by its values at the raster."""
         wanted, shape = self._amounts.crumbs, self._shape
         if wanted is None:
             return []
 
-        def chance(x: Array, y: Array) -> Array:
-            places = self._look_up(x, y)
-            pressed = self._rebuilt(places, self._wider)[2]
-            near = self._around(places, pressed).near(wanted.width)
-            return near * (1.0 - (1.0 - wanted.within) * pressed)
+        near = self._around(places, pressed).near(wanted.width)
+        chances = np.append(near * (1.0 - (1.0 - wanted.within) * pressed), 0.0)
 
-        low, high = (np.array([place(x), place(y)]) for place in (np.min, np.max))
+        def chance(x: Array, y: Array) -> Array:
+            return np.asarray(chances[self._raster.nearest(x, y)])
+
+        low, high = (np.array([place(places.x), place(places.y)]) for place in (np.min, np.max))
         return scattered(
             self._amounts.surface, self._seed + 181, low, high, chance,
             share=wanted.share, smallest=FINEST_CRUMB * self._finest, fineness=shape.fineness,
@@ -218,24 +227,27 @@ class PrintRelief:
                 further[on_wall] += amount * noise(self._seed + 51 + number, size, *at)
         return further
 
-    def _relief(self, places: _Places) -> Relief:
-        height, compression, pressed = self._rebuilt(places, self._wider)
-        share = self._part * min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
+    def _made(self, places: _Places, rebuilt: tuple[Array, Array, Array]) -> _Made:
+        height, compression, pressed = rebuilt
         around = self._around(places, pressed)
         made_of = (*self._amounts.layers, *self.crumbs, *self._drags)
         layers = sum((layer.heights(around) for layer in made_of), np.zeros(len(places.x)))
-        layers = share * (layers + self._standing(places, around))
-        deeper = self._deeper * pressed * places.floor * places.fade
-        height = height + layers * places.fade - deeper
-        water = np.maximum(self._level - (places.rim - places.compression + height), 0.0) * (pressed > FULL)
-        return Relief(height, compression + deeper, water, pressed)
+        return _Made(height, compression, pressed, layers + self._standing(places, around))
 
-    def _water_level(self, places: _Places) -> float:
+    def _relief(self, places: _Places, made: _Made) -> Array:
+        """The values of a `Relief`, (4, N)."""
+        share = self._part * min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
+        deeper = self._deeper * made.pressed * places.floor * places.fade
+        height = made.height + share * made.layers * places.fade - deeper
+        water = np.maximum(self._level - (places.rim - places.compression + height), 0.0) * (made.pressed > FULL)
+        return np.stack([height, made.compression + deeper, water, made.pressed])
+
+    def _water_level(self, places: _Places, made: _Made) -> float:
         """Height of the water in the print, from the undisturbed ground [m]."""
         water, floor = self._amounts.water, places.inward > CORE * self._shape.fineness
         if water is None or not floor.any():
             return -np.inf
-        heights = (places.rim - places.compression + self._relief(places).height)[floor]
+        heights = (places.rim - places.compression + self._relief(places, made)[0])[floor]
         return float(np.percentile(heights, 50.0 * water.share) + water.above * MM * self._shape.fineness)
 
     def _standing(self, places: _Places, around: Around) -> Array:
@@ -281,6 +293,16 @@ class _Places:
     fade: Array
 
 
+@dataclass(frozen=True)
+class _Made:
+    """Parts of a relief at places, all (N,) arrays: what the broken wall changes, see `_rebuilt`, and layers [m]."""
+
+    height: Array
+    compression: Array
+    pressed: Array
+    layers: Array
+
+
 def relief_of_print(
     footprint: Footprint,
     amounts: Amounts,
@@ -290,10 +312,11 @@ def relief_of_print(
     seed: int,
     tread: SoleTread | None = None,
     tread_strength: float = 1.0,
+    in_raster: bool = False,
 ) -> PrintRelief | None:
     """The relief of a footprint; None where it pressed next to nothing. See `PrintRelief`."""
     shape = shape_of(footprint, blur_sigma)
     if shape is None or not shape.depth > 0:
         return None
     drags = drags_of(footprint, shape.along[1] - shape.along[0], shape.depth)
-    return PrintRelief(shape, amounts, seed, finest, tread, tread_strength, drags)
+    return PrintRelief(shape, amounts, seed, finest, tread, tread_strength, drags, in_raster=in_raster)

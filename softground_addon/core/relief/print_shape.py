@@ -32,12 +32,47 @@ SHARP = 0.02
 LEVEL = 0.995
 """Length of a sole seen from above, in parts of the greatest, from which it lies flat."""
 
+SAME, BETWEEN = 1e-3, -2
+"""Distance of places that count as one, over the spacing of a raster, and the number of those between its places."""
+
 _FADE = 5
 """Index in `PrintShape.fields` of the nearness to the end of the moved ground."""
 MOVED = 1e-5
 """Ground that moves less, or lies beside such cells, has no relief [m]."""
 FADING = 0.012
 """Width over which relief ends where the print no longer moves the ground [m]."""
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Places in a raster over a print, where it moves the ground.
+
+    Attributes
+    ----------
+    x, y : (N,) float arrays
+        [m]
+    number : (rows, columns) int array
+        Number of each place of the window, -1 where the print moves nothing.
+    """
+
+    window: Window
+    spacing: float
+    x: Array
+    y: Array
+    number: Indices
+
+    def numbers(self, x: Array, y: Array) -> Indices:
+        """Numbers of the places at x, y (K,) [m]; -1 where the print moves nothing, `BETWEEN` for those between."""
+        u, v = x / self.spacing - 0.5, y / self.spacing - 0.5
+        between = np.maximum(np.abs(u - np.rint(u)), np.abs(v - np.rint(v))) > SAME
+        return np.where(between, BETWEEN, self.nearest(x, y))
+
+    def nearest(self, x: Array, y: Array) -> Indices:
+        """Numbers of the places in whose squares x, y (K,) [m] lie; -1 where the print moves nothing."""
+        column, row = (np.floor(axis / self.spacing).astype(np.intp) for axis in (x, y))
+        column, row = column - self.window.column, row - self.window.row
+        within = (column >= 0) & (column < self.window.columns) & (row >= 0) & (row < self.window.rows)
+        return np.where(within, self.number[np.where(within, row, 0), np.where(within, column, 0)], -1)
 
 
 @dataclass(frozen=True)
@@ -83,18 +118,14 @@ class PrintShape:
         """True for world places (N,) at which the print moves the ground."""
         return np.asarray(self._between(self.fields[_FADE, None], x, y)[0] > 0)
 
-    def moved(self, spacing: float) -> tuple[Array, Array]:
-        """World places where the print moves the ground (N,): cells' centres and, at such a spacing, those between."""
+    def moved(self, spacing: float) -> Raster:
+        """The centres of cells, or at about such a spacing of equal parts of them, where the print moves the ground."""
         parts = max(1, round(self.cell_size / spacing))
-        between = np.arange(parts) * self.cell_size / parts
-        x, y = (
-            places.ravel()
-            for places in np.meshgrid(
-                *((centre[:, None] + between).ravel() for centre in self.window.centres(self.cell_size))
-            )
-        )
+        window = self.window.refined(parts)
+        x, y = (centres.ravel() for centres in np.meshgrid(*window.centres(self.cell_size / parts)))
         moves = self.moves(x, y)
-        return x[moves], y[moves]
+        number = np.where(moves, np.cumsum(moves) - 1, -1).reshape(window.rows, window.columns)
+        return Raster(window, self.cell_size / parts, x[moves], y[moves], number)
 
     def _between(self, fields: Array, x: Array, y: Array) -> Array:
         column = np.clip(x / self.cell_size - 0.5 - self.window.column, 0.0, self.window.columns - 1.001)

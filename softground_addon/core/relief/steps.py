@@ -18,6 +18,7 @@ from ..record.footprints import Footprint
 from .amounts import Amounts
 from .carved_lumps import lumps, lying
 from .print_relief import FINEST_CRUMB, relief_of_print
+from .print_shape import SAME
 from .tread import SoleTread
 
 QUANTUM = 2.0**-20
@@ -126,11 +127,13 @@ def _step(
     if not len(point):
         return NOTHING
     tread = wanted.treads.get((footprint.character, footprint.sole)) if wanted.tread_strength > 0 else None
+    finest = _finest(places, point, footprint.cell_size)
     of_print = relief_of_print(
         footprint,
         wanted.of_surfaces.get(footprint.surface, wanted.amounts),
         blur_sigma=blur_sigma,
-        finest=_finest(places, point, footprint.cell_size),
+        finest=finest,
+        in_raster=_in_raster(places, point, finest),
         seed=zlib.crc32(step_id(footprint).encode()),
         tread=tread,
         tread_strength=wanted.tread_strength,
@@ -169,6 +172,12 @@ def _finest(places: Places, point: Indices, cell_size: float) -> float:
     column, row = np.floor(places.x[point] / cell_size), np.floor(places.y[point] / cell_size)
     cells = len(np.unique(column + 1j * row))
     return float(cell_size / max(1.0, np.round(np.sqrt(len(point) / cells))))
+
+
+def _in_raster(places: Places, point: Indices, spacing: float) -> bool:
+    """True if most places around a print are centres of the squares of a spacing [m], as on a ground that is made."""
+    x, y = (axis[point] / spacing % 1.0 - 0.5 for axis in (places.x, places.y))
+    return bool(np.median(np.maximum(np.abs(x), np.abs(y))) < SAME)
 
 
 def all_together(steps: Sequence[StepRelief], places: int) -> Array:

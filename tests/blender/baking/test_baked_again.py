@@ -2,7 +2,7 @@
 
 import bpy
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.blender import jobs, reuse
@@ -86,6 +86,7 @@ def record_in(scene):
 
 
 @settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@example([("preset", 1), ("relief", 3)])  # water, and then none
 @given(st.lists(st.tuples(st.sampled_from(sorted(CHANGES)), st.integers(1, 4)), min_size=2, max_size=4))
 def test_what_a_bake_leaves_is_the_same_whatever_was_baked_before(opened_as, changes):
     scene = opened_as(baked_walk)
@@ -138,7 +139,7 @@ def test_edits_of_steps_have_them_pressed_anew_and_come_with_the_bake(again):
     assert baked_ground.record_of(ground).edited[0].compressed_m3 == half.compressed_m3
 
 
-PRINTED = {"prints", "movements", "relief"}
+PRINTED = {"prints", "findings", "trail", "movements", "relief"}
 """What follows from other prints."""
 
 
@@ -153,7 +154,7 @@ PRINTED = {"prints", "movements", "relief"}
         ("cell_size", PRINTED),
         ("mass", PRINTED | {"loads", "motion"}),
         ("keys", PRINTED | {"loads", "motion"}),
-        ("shoes", PRINTED | {"loads", "terrain", "motion"}),
+        ("shoes", PRINTED | {"loads", "motion"}),
         ("ground", PRINTED | {"loads", "terrain", "motion"}),  # the bake is cleared before
     ],
 )
@@ -189,3 +190,31 @@ def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):
     assert ("prints", "") in state.results
     bpy.ops.wm.read_homefile(use_empty=True)
     assert not state.results
+
+
+def walk_without_ground(scene):
+    """A walk that no bake has given a ground yet."""
+    shots.walker(scene, frames=36)
+    bpy.ops.softground.add_character()
+    scene.softground.relief, scene.softground.debris, scene.softground.cell_size = "FINE", True, 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "follows"),
+    [
+        ("nothing", set()),
+        ("relief_strength", set()),
+        ("tread", {"relief"}),
+        ("preset", PRINTED),
+        ("keys", PRINTED | {"loads", "motion"}),
+        ("ground", PRINTED | {"loads", "terrain", "motion"}),
+    ],
+)
+def test_a_bake_on_the_ground_that_the_last_has_made_takes_over_what_still_holds(opened_as, name, follows):
+    scene = opened_as(walk_without_ground)
+    jobs.run(bake_job.bake(scene))
+    its = anew(scene, lambda: CHANGES[name](scene, 1)) | {"findings"}  # which name the ground
+    assert its == follows | {"findings"}
+    as_it_comes = record_in(scene)
+    reuse.forget()
+    assert record_in(scene) == as_it_comes
