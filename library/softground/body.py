@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core.capture.captured import Plate, bridged, check_length
-from ._core.capture.joint_centres import CapturedBody
-from ._core.capture.skeleton import Skeleton, skeleton_of
+from ._core.capture.joint_centres import UPWARD, CapturedBody, axis_along, turned
+from ._core.capture.skeleton import Bone, Skeleton, skeleton_of
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
 from ._core.motion.people import likely_mass
@@ -34,6 +34,9 @@ GRAVITY = 9.81
 _NEEDED = tuple(f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle", "heel", "ball", "toe"))
 _FARTHEST = 1e6
 """Largest coordinate [m]."""
+_STRAIGHT = 0.94
+"""Cosine of the largest angle between an axis and the way from feet to hips along which that axis is taken for up: 20°,
+which is less than of somebody who sits or crawls."""
 _POSES = 24
 """Poses by which the parts of a mesh that move together are found."""
 
@@ -85,6 +88,7 @@ class Body:
         joints: Mapping[str, ArrayLike],
         rate: float,
         *,
+        up: str | None = None,
         mass: float | None = None,
         name: str = "body",
         plates: Sequence[Plate] = (),
@@ -94,10 +98,13 @@ class Body:
         Parameters
         ----------
         joints : mapping of str to (F, 3) float array
-            Paths, Z up [m]: `hip`, `knee`, `ankle`, and on the skin of the foot `heel`, `ball` and `toe`, each with
+            Paths [m]: `hip`, `knee`, `ankle`, and on the skin of the foot `heel`, `ball` and `toe`, each with
             `_l` and `_r`; `hips`, `neck`, `head`, and `shoulder`, `elbow` and `wrist` of both sides if known.
         rate : float
             Frames per second [Hz].
+        up : str, optional
+            The upward axis of paths and plates: X, Y, Z, -X, -Y or -Z. Z if not given, and then a body whose hips are
+            straight beside its feet is refused; give "Z" if it lies.
         mass : float, optional
             [kg]; that of a person of this size if not given.
         name : str, optional
@@ -106,7 +113,7 @@ class Body:
         Raises
         ------
         InputError
-            If joints of the legs are missing or have no length, or arrays do not fit.
+            If joints of the legs are missing or have no length, arrays do not fit, or another axis than Z is up.
 
         References
         ----------
@@ -124,9 +131,12 @@ class Body:
         wrong = [joint for joint, path in paths.items() if path.shape != (count, 3) or not np.isfinite(path).all()]
         if wrong:
             raise InputError(f"the path of {wrong[0]} is not numbers of the shape ({count}, 3)", "wrong_shape")
+        turn = _turn_up(paths, up, name)
+        paths = {joint: path @ turn.T for joint, path in paths.items()}
+        plates = [turned(plate, turn) for plate in plates]
         paths.setdefault("hips", (paths["hip_l"] + paths["hip_r"]) / 2)
         skeleton = skeleton_of(CapturedBody(paths, rate))
-        body = cls.from_skeleton(skeleton, mass=mass, name=name, plates=plates)
+        body = cls.from_skeleton(skeleton, up="Z", mass=mass, name=name, plates=plates)
         return replace(body, motion=motion_of_markers(paths, rate, mass=body.mass, name=name))
 
     @classmethod
@@ -135,6 +145,7 @@ class Body:
         skeleton: Skeleton,
         *,
         joints: Mapping[str, BoneEnd] | None = None,
+        up: str | None = None,
         mass: float | None = None,
         name: str = "body",
         plates: Sequence[Plate] = (),
@@ -144,16 +155,16 @@ class Body:
         Parameters
         ----------
         skeleton : Skeleton
-            Z up [m].
+            [m]
         joints : mapping of str to (str, str), optional
             Bone of each joint, and its end "head" or "tail"; by the names of the usual rigs if not given.
-        mass, name, plates
+        up, mass, name, plates
             As for `from_joints`.
 
         Raises
         ------
         InputError
-            If no feet are found among the bones, or a joint names a bone that is not there.
+            If no feet are found among the bones, a joint names a bone that is not there, or another axis than Z is up.
         """
         check_length(len(skeleton.poses), skeleton.rate)
         bones = rest_bones(skeleton)
@@ -169,6 +180,14 @@ class Body:
             )
         if unknown := {bone for bone, _ in mapping.joints.values()} - bones.keys():
             raise InputError(f"no bone {', '.join(sorted(unknown))} among the bones {', '.join(bones)}", "unknown_bone")
+        numbers = [*bones]
+        ends = {
+            joint: skeleton.poses[:, numbers.index(bone)] @ (0.0, bones[bone].length * (end == "tail"), 0.0, 1.0)
+            for joint, (bone, end) in mapping.joints.items()
+        }
+        turn = _turn_up({joint: path[:, :3] for joint, path in ends.items()}, up, name)
+        skeleton, plates = placed(skeleton, turn, 1.0), [turned(plate, turn) for plate in plates]
+        bones = rest_bones(skeleton)
         recording = Recording(
             np.arange(len(skeleton.poses), dtype=float),
             tuple(bones),
@@ -238,6 +257,46 @@ def rest_bones(skeleton: Skeleton) -> dict[str, RestBone]:
         bone.name: RestBone(bone.parent, matrix, bone.head, bone.tail, float(np.linalg.norm(bone.tail - bone.head)))
         for bone, matrix in zip(skeleton.bones, skeleton.rest(), strict=True)
     }
+
+
+def placed(skeleton: Skeleton, turn: Array, scale: float) -> Skeleton:
+    """The skeleton under a rotation (3, 3), and scaled."""
+
+    def moved(matrices: Array) -> Array:
+        matrices = matrices.copy()
+        matrices[..., :3, :3] = turn @ matrices[..., :3, :3]
+        matrices[..., :3, 3] = scale * matrices[..., :3, 3] @ turn.T
+        return matrices
+
+    bones = tuple(
+        Bone(bone.name, bone.parent, scale * turn @ bone.head, scale * turn @ bone.tail, turn @ bone.x_axis)
+        for bone in skeleton.bones
+    )
+    at_rest = None if skeleton.at_rest is None else moved(skeleton.at_rest)
+    return Skeleton(bones, moved(skeleton.poses), skeleton.rate, at_rest)
+
+
+def _turn_up(joints: Mapping[str, Array], up: str | None, name: str) -> Array:
+    """Rotation (3, 3) that brings an axis up; Z is up if none is given.
+
+    Raises InputError if hips are along another axis than Z from the feet, and nobody says that it is to be so.
+    """
+    if up is not None:
+        if up not in UPWARD:
+            raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}", "unknown_axis", up=up)
+        return UPWARD[up]
+    ends = [f"{joint}_{side}" for joint in ("hip", "ankle") for side in "lr"]
+    if joints.keys() >= {*ends}:
+        hips, ankles = (np.mean([joints[end] for end in pair], axis=0) for pair in (ends[:2], ends[2:]))
+        seen, above = axis_along(hips - ankles), np.median(hips - ankles, axis=0)
+        if seen != "Z" and np.abs(above).max() > _STRAIGHT * np.linalg.norm(above):
+            raise InputError(
+                f"the hips of '{name}' are above its feet along {seen}, not Z: give up={seen!r}, or up='Z' if it lies",
+                "wrong_axis",
+                up=seen,
+                above=above.tolist(),
+            )
+    return UPWARD["Z"]
 
 
 def _mapped(joints: Mapping[str, BoneEnd]) -> RigMapping:

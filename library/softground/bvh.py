@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core.capture.captured import check_length
-from ._core.capture.joint_centres import UPWARD
+from ._core.capture.joint_centres import UPWARD, axis_along
 from ._core.capture.skeleton import Bone, Skeleton
 from ._core.errors import InputError
 from ._core.motion.units import scale_to_metres
 from ._core.numerics.rigid import rotation
 from ._core.rig.bones import extent
 from ._core.rig.name_mapping import map_by_names
-from .body import rest_bones
+from .body import placed, rest_bones
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def read(content: bytes, *, up: str | None = None, scale: float | None = None) -
     skeleton = _skeleton(joints, rate, values)
     turn = UPWARD[up or _upward(skeleton)]
     size = extent(np.array([bone.head for bone in skeleton.bones]), np.eye(4))
-    return _placed(skeleton, turn, scale_to_metres(size, captured=True) if scale is None else scale)
+    return placed(skeleton, turn, scale_to_metres(size, captured=True) if scale is None else scale)
 
 
 def _joints(words: list[str]) -> list[_Joint]:
@@ -195,18 +195,4 @@ def _upward(skeleton: Skeleton) -> str:
         or not {f"{joint}_{side}" for joint in ("hip", "ankle") for side in "lr"} <= mapping.joints.keys()
     ):
         raise InputError("no bones of the BVH file are called legs: give its upward axis as up", "unknown_axis")
-    above = np.median(middle("hip") - middle("ankle"), axis=0)
-    axis = int(np.argmax(np.abs(above)))
-    return ("" if above[axis] > 0 else "-") + "XYZ"[axis]
-
-
-def _placed(skeleton: Skeleton, turn: Array, scale: float) -> Skeleton:
-    """The skeleton turned and scaled."""
-    bones = tuple(
-        Bone(bone.name, bone.parent, scale * turn @ bone.head, scale * turn @ bone.tail, turn @ bone.x_axis)
-        for bone in skeleton.bones
-    )
-    poses = skeleton.poses.copy()
-    poses[..., :3, :3] = turn @ poses[..., :3, :3]
-    poses[..., :3, 3] = scale * poses[..., :3, 3] @ turn.T
-    return Skeleton(bones, poses, skeleton.rate)
+    return axis_along(middle("hip") - middle("ankle"))

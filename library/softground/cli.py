@@ -79,6 +79,9 @@ def _parser() -> argparse.ArgumentParser:
     pressing.add_argument("--csv", type=Path, metavar="FILE.csv", help="write a table of the prints")
     for command in (forces, pressing):
         command.add_argument("file", type=Path, help="motion: .c3d, .trc, .bvh, or AMASS .npz")
+        command.add_argument(
+            "--static", type=Path, metavar="FILE", help="static trial (.c3d, .trc) with further markers"
+        )
         command.add_argument("--mass", type=float, metavar="KG", help="of the body; else as the file or its size says")
         command.add_argument("--level", type=float, default=0.0, metavar="M", help="height of the level ground [m]")
     validating = commands.add_parser("validate", help="forces against force plates", description=validate.__doc__)
@@ -166,7 +169,10 @@ def _loads(options: argparse.Namespace) -> Loads:
     suffix = options.file.suffix.lower()
     if suffix not in READERS:
         raise InputError(f"'{options.file}' is not read here: give a file of {', '.join(READERS)}", "wrong_format")
-    body = READERS[suffix](options.file, mass=options.mass)
+    if options.static and suffix not in (".c3d", ".trc"):
+        raise InputError(f"--static is for files of markers (.c3d, .trc), not {options.file.name}", "wrong_format")
+    static = {"static": options.static} if options.static else {}
+    body = READERS[suffix](options.file, mass=options.mass, **static)
     source = "" if body.mass_from == "given" else f" (by {body.mass_from})"
     print(f"{body.name}: {body.mass:g} kg{source}, {len(body.times)} frames at {body.rate:g} Hz")
     loads = estimate_loads(body, options.level)

@@ -14,6 +14,7 @@ from ._core.capture.joint_centres import UPWARD, CapturedBody, captured_body
 from ._core.errors import InputError
 from ._core.files import files
 from .body import Body
+from .static_trial import with_static
 
 LARGEST = 2**29
 """Size of a file that is read [bytes]."""
@@ -24,7 +25,9 @@ _MASSES = ("BODYMASS", "MASS", "WEIGHT")
 PathLike = str | os.PathLike[str]
 
 
-def read_c3d(path: PathLike, *, mass: float | None = None, up: str | None = None) -> Body:
+def read_c3d(
+    path: PathLike, *, mass: float | None = None, up: str | None = None, static: PathLike | None = None
+) -> Body:
     """The body in a C3D file of markers, with its force plates.
 
     Parameters
@@ -35,23 +38,29 @@ def read_c3d(path: PathLike, *, mass: float | None = None, up: str | None = None
     up : str, optional
         The laboratory's upward axis: X, Y, Z, -X, -Y or -Z; the one along which the pelvis is above the feet if not
         given.
+    static : path, optional
+        C3D or TRC file of the same subject standing, with the markers that this one lacks: they follow the nearest
+        cluster of markers that both have.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or holds no markers of two legs.
+        If a file cannot be read, or holds no markers of two legs.
 
     References
     ----------
     The C3D file format, a technical user manual (c3d.org). Joint centres: Harrington et al. 2007,
-    10.1016/j.jbiomech.2006.02.003; de Leva 1996, 10.1016/0021-9290(96)00021-8.
+    10.1016/j.jbiomech.2006.02.003; de Leva 1996, 10.1016/0021-9290(96)00021-8. Static trials: Cappozzo et al. 1995,
+    10.1016/0268-0033(95)91394-T.
     """
     content = content_of(path)
     known = c3d_mass(content) if mass is None else mass
-    return _marked(path, c3d.read(content), known, up)
+    return _marked(path, c3d.read(content), known, up, static)
 
 
-def read_trc(path: PathLike, *, mass: float | None = None, up: str | None = None) -> Body:
+def read_trc(
+    path: PathLike, *, mass: float | None = None, up: str | None = None, static: PathLike | None = None
+) -> Body:
     """The body in a TRC file of markers.
 
     Parameters
@@ -59,7 +68,7 @@ def read_trc(path: PathLike, *, mass: float | None = None, up: str | None = None
     path : path
     mass : float, optional
         [kg]; that of a person of this size if not given.
-    up : str, optional
+    up, static
         As for `read_c3d`.
 
     Raises
@@ -71,7 +80,7 @@ def read_trc(path: PathLike, *, mass: float | None = None, up: str | None = None
     ----------
     OpenSim documentation, "Marker (.trc) Files".
     """
-    return _marked(path, trc.read(content_of(path)), mass, up)
+    return _marked(path, trc.read(content_of(path)), mass, up, static)
 
 
 def read_amass(path: PathLike, *, mass: float | None = None) -> Body:
@@ -113,7 +122,8 @@ def read_bvh(path: PathLike, *, mass: float | None = None, up: str | None = None
     InputError
         If the file cannot be read, or no feet are found among its bones.
     """
-    return Body.from_skeleton(bvh.read(content_of(path), up=up, scale=scale), mass=mass, name=Path(path).stem)
+    skeleton = bvh.read(content_of(path), up=up, scale=scale)
+    return Body.from_skeleton(skeleton, up="Z", mass=mass, name=Path(path).stem)
 
 
 def content_of(path: PathLike) -> bytes:
@@ -133,11 +143,21 @@ def c3d_mass(content: bytes) -> float | None:
     return float(masses[0].flat[0]) if masses and masses[0].size and masses[0].flat[0] > 0 else None
 
 
-def _marked(path: PathLike, capture: Capture, mass: float | None, up: str | None) -> Body:
+def _marked(path: PathLike, capture: Capture, mass: float | None, up: str | None, static: PathLike | None) -> Body:
     if up is not None and up not in UPWARD:
         raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}", "unknown_axis", up=up)
-    return _captured(path, captured_body(capture, up), mass)
+    if static is not None:
+        is_trc = Path(static).suffix.lower() == ".trc"
+        capture = with_static(capture, (trc if is_trc else c3d).read(content_of(static)))
+    try:
+        return _captured(path, captured_body(capture, up), mass)
+    except InputError as error:
+        if error.code != "missing_markers" or static is not None:
+            raise
+        message = f"{error}; or give the static trial that has them, and shares clusters of markers with this one"
+        missing, labels = error.facts["missing"], error.facts["labels"]
+        raise InputError(message, "missing_markers", missing=missing, labels=labels) from error
 
 
 def _captured(path: PathLike, body: CapturedBody, mass: float | None) -> Body:
-    return Body.from_joints(body.joints, body.rate, mass=mass, name=Path(path).stem, plates=body.plates)
+    return Body.from_joints(body.joints, body.rate, up="Z", mass=mass, name=Path(path).stem, plates=body.plates)

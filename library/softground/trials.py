@@ -122,7 +122,7 @@ def read_marked(path: Path) -> Trial:
     captured = captured_body(c3d.read(content)) if is_c3d else captured_body(trc.read(content), "Y")
     table = None if is_c3d else forces_beside(path)
     plates = plates_of(table, first_time(content)) if table else captured.plates
-    body = Body.from_joints(captured.joints, captured.rate, mass=mass, name=path.stem, plates=plates)
+    body = Body.from_joints(captured.joints, captured.rate, up="Z", mass=mass, name=path.stem, plates=plates)
     shown = plates_on_feet(body)
     return Trial(
         path.stem,

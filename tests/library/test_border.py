@@ -18,9 +18,11 @@ import pytest
 from library import softground
 from library.softground import prints as prints_module
 from library.softground import storage
+from library.softground.body import placed
 from library.softground.cli import main
 from library.softground.plates import free_moment
-from softground_addon.core.capture.joint_centres import UPWARD
+from softground_addon.core.capture.joint_centres import UPWARD, CapturedBody
+from softground_addon.core.capture.skeleton import skeleton_of
 from softground_addon.core.ground.field_tests import snow as snow_of_core
 from softground_addon.core.ground.heightfield import SlopingTerrain
 from softground_addon.core.loads import estimate
@@ -358,6 +360,45 @@ def test_forces_of_plates_by_their_usual_names_are_turned_with_the_markers(tmp_p
 
 def scaled(factor):
     return {name: path * factor for name, path in standing().items()}
+
+
+def on_its_side(axis):
+    """The standing body with another axis up."""
+    return {name: path @ UPWARD[axis] for name, path in standing().items()}
+
+
+def skeleton_on_its_side(axis):
+    joints = standing()
+    joints["hips"] = (joints["hip_l"] + joints["hip_r"]) / 2
+    return placed(skeleton_of(CapturedBody(joints, RATE)), UPWARD[axis].T, 1.0)
+
+
+@pytest.mark.parametrize("axis", ["X", "Y", "-Y", "-Z"])
+@pytest.mark.parametrize(
+    ("body", "lying"),
+    [
+        (lambda *given, **options: softground.Body.from_joints(*given, RATE, **options), on_its_side),
+        (softground.Body.from_skeleton, skeleton_on_its_side),
+    ],
+    ids=["joints", "skeleton"],
+)
+def test_a_body_with_another_axis_up_is_noticed_and_turned_on_request(axis, body, lying):
+    with pytest.raises(softground.InputError, match=f"above its feet along {axis}, not Z: give up='{axis}'") as noticed:
+        body(lying(axis), mass=MASS)
+    assert (noticed.value.code, noticed.value.facts["up"]) == ("wrong_axis", axis)
+    turned, upright = body(lying(axis), mass=MASS, up=axis), body(lying("Z"), mass=MASS)
+    for one, other in zip(turned.shape.soles, upright.shape.soles, strict=True):
+        np.testing.assert_allclose(one.landmark_positions(), other.landmark_positions(), atol=1e-9)
+    with pytest.raises(softground.InputError, match="must be one of X"):
+        body(lying(axis), mass=MASS, up="up")
+
+
+def test_a_body_that_lies_is_read_if_somebody_says_so_and_one_that_sits_or_bends_forward_in_any_case():
+    lying = {name: path + np.array((0.0, 0.0, 0.1)) for name, path in on_its_side("Y").items()}
+    assert softground.Body.from_joints(lying, RATE, mass=MASS, up="Z").motion.joints["hip_l"][0, 2] < 0.3
+    on_floor, lower = ("ankle", "heel", "ball", "toe"), np.array((0.0, -0.45, -0.4))
+    sitting = {name: path if name.startswith(on_floor) else path + lower for name, path in standing().items()}
+    softground.Body.from_joints(sitting, RATE, mass=MASS)
 
 
 def refusals():

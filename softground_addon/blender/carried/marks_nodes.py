@@ -13,7 +13,7 @@ from ..nodes.node_graph import NodeGraph
 from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Marks"
-VERSION = 2
+VERSION = 3
 """Of the laws that it plays; another bake replaces a group of an earlier one."""
 MARK = "softground_marks"
 """Custom property of the group, of its object and of the material."""

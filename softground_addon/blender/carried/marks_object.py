@@ -22,7 +22,7 @@ from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
 from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
-from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
+from ..nodes.node_modifiers import curves_of, inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import marks_nodes as nodes
 from .marks_material import material_for
@@ -121,15 +121,12 @@ def _text(floors: FloorSteps) -> str:
 def _floors(text: str) -> FloorSteps:
     """Steps on hard floors from `_text`."""
     said = json.loads(text)
-    soles = []
     for sole in said["soles"]:
-        meetings = tuple(
-            Meeting(meeting["frame"], None if meeting["shares"] is None else np.array(meeting["shares"]))
-            for meeting in sole["meetings"]
-        )
-        fixed = {"of": tuple(sole["of"]), "areas": np.array(sole["areas"]), "meetings": meetings}
-        soles.append(SoleOnFloors(**{**sole, **fixed}))
-    return FloorSteps(said["kind"], said["ground"], tuple(soles), tuple(said.get("scaled", (1.0, 1.0))))
+        for meeting in sole["meetings"]:
+            meeting["shares"] = None if meeting["shares"] is None else np.array(meeting["shares"])
+        sole["meetings"] = tuple(Meeting(**meeting) for meeting in sole["meetings"])
+        sole["of"], sole["areas"] = tuple(sole["of"]), np.array(sole["areas"])
+    return FloorSteps(**{**said, "soles": tuple(SoleOnFloors(**sole) for sole in said["soles"])})
 
 
 def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
@@ -182,9 +179,11 @@ def _play(modifier: Any, group: Any) -> None:
     set_inputs(modifier, chosen)
 
 
-def sliders_of(obj: bpy.types.Object) -> dict[str, float]:
-    """Values of the sliders of marks by name, those at first where the artist has none."""
-    return _sliders(_modifier_of(obj))
+def sliders_of(obj: bpy.types.Object, frame: float) -> dict[str, float]:
+    """Values of the sliders of marks at a frame of the animation by name, those at first where the artist has none."""
+    modifier = _modifier_of(obj)
+    keyed = curves_of(modifier) if modifier and modifier.node_group else {}
+    return _sliders(modifier) | {name: curve.evaluate(frame) for name, curve in keyed.items()}
 
 
 def _sliders(modifier: Any) -> dict[str, float]:

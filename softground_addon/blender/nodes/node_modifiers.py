@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import bpy
 
-from ..compat import write_input
+from .. import compat
 
 
 class GroupInput(NamedTuple):
@@ -59,11 +59,21 @@ def inputs_of(modifier: Any) -> dict[str, str]:
     return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
 
 
+def curves_of(modifier: Any) -> dict[str, bpy.types.FCurve]:
+    """Curves by which the object of a modifier keys its inputs, by their names; without those that are muted."""
+    animation = modifier.id_data.animation_data
+    if animation is None or animation.action is None:
+        return {}
+    curves = compat.action_curves(animation.action, compat.slot_of(animation))
+    paths = {compat.input_path(modifier, identifier): name for name, identifier in inputs_of(modifier).items()}
+    return {paths[curve.data_path]: curve for curve in curves if curve.data_path in paths and not curve.mute}
+
+
 def set_inputs(modifier: Any, values: Mapping[str, Any]) -> None:
     """Set inputs of a modifier by their names, of those that its node group has."""
     for name, identifier in inputs_of(modifier).items():
         if name in values:
-            write_input(modifier, identifier, values[name])
+            compat.write_input(modifier, identifier, values[name])
 
 
 def nodes_of(modifier: Any) -> list[Any]:

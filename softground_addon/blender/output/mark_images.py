@@ -45,8 +45,7 @@ class FloorImage:
         [kg/m²], scene frame.
     marks : bpy.types.Object
         Whose sliders count.
-    frame_rate : float
-        Scene frames per second [Hz].
+    units : SceneUnits
     """
 
     floor: str
@@ -55,14 +54,14 @@ class FloorImage:
     mass: Array
     birth: Array
     marks: bpy.types.Object
-    frame_rate: float
+    units: SceneUnits
 
     def at(self, frame: float) -> Array:
         """Mass [kg/m²], wet look from 1 to 0, and time since the latest mark [s], (N + 1, 3); last, of all others."""
         surface = surfaces.sticking(marks_object.floors_of(self.marks).kind)
-        sliders = marks_object.sliders_of(self.marks)
+        sliders = marks_object.sliders_of(self.marks, frame * self.units.time_stretch)
         there = (self.birth <= frame) & (self.mass > 0)
-        place, seconds = self.place[there], (frame - self.birth[there]) / self.frame_rate
+        place, seconds = self.place[there], (frame - self.birth[there]) / self.units.frame_rate
         passed = seconds * sliders["Time Scale"]
         now = aged(self.mass[there], passed, surface, *(sliders[name] for name in ("Drying", "Rain", "Temperature")))
         channels = np.zeros((len(self.index) + 1, 3))
@@ -102,7 +101,7 @@ def floor_images(
             continue
         index, pixel = np.unique(np.concatenate([layer.index for layer in layers]), return_inverse=True)
         mass, birth = np.concatenate([layer.position for layer in layers]).T
-        yield FloorImage(floor.name, index, pixel, mass, birth, marks, units.frame_rate)
+        yield FloorImage(floor.name, index, pixel, mass, birth / units.time_stretch, marks, units)
 
 
 def _in_world(obj: bpy.types.Object, place: Any) -> Array:

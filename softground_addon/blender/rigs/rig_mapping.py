@@ -169,7 +169,9 @@ def rest_bones(armature: bpy.types.Object) -> RigBones:
             matrix=np.array(bone.matrix_local, dtype=float),
             head=np.array(bone.head_local, dtype=float),
             tail=np.array(bone.tail_local, dtype=float),
-            length=bone.length,
+            length=float(
+                np.linalg.norm(np.array(bone.tail_local, dtype=float) - np.array(bone.head_local, dtype=float))
+            ),
         )
         for bone in armature.data.bones
     }

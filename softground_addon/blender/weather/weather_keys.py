@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.weather.weather import PARTS, Span, span_of
 from .. import compat
+from ..nodes import node_modifiers
 from ..playback import weather_modifier, weather_table
 from ..playback.weather_course_nodes import FIRST, KEYED, STEP, SUMMED, UNITS, field_of, keys_of, switch_of
 from ..playback.weather_nodes import within
@@ -140,22 +141,7 @@ def is_keyed(modifier: Any, *names: str) -> bool:
 
 def _keyed(modifier: Any) -> Mapping[str, bpy.types.FCurve]:
     """The curves of those inputs that are keyed and summed up, by name."""
-    animation = modifier.id_data.animation_data
-    if animation is None or animation.action is None:
-        return {}
-    curves = {
-        curve.data_path: curve
-        for curve in compat.action_curves(animation.action, compat.slot_of(animation))
-        if not curve.mute
-    }
-    if not curves:
-        return {}
-    paths = {
-        name: compat.input_path(modifier, key)
-        for name, key in weather_modifier.inputs_of(modifier).items()
-        if name in SUMMED
-    }
-    return {name: curves[path] for name, path in paths.items() if path in curves}
+    return {name: curve for name, curve in node_modifiers.curves_of(modifier).items() if name in SUMMED}
 
 
 def _means(curve: bpy.types.FCurve, span: Span) -> NDArray[np.float32]:

@@ -93,10 +93,11 @@ def captured_body(capture: Capture, up: str | None = None) -> CapturedBody:
     for side in "lr":
         joints |= {f"{joint}_{side}": path for joint, path in _arm(points, side, _leg_length(joints)).items()}
     joints |= _trunk(points, joints)
-    turn = UPWARD[up or _upward(joints)]
+    # The hips are above the heels most of the time.
+    turn = UPWARD[up or axis_along(joints["hips"] - (joints["heel_l"] + joints["heel_r"]) / 2)]
     # `@` with small matrices on the right, so that nothing wakes the threads of the BLAS library.
     upright = {name: path @ turn.T for name, path in joints.items()}
-    plates = tuple(_pushing_up(_turned(plate, turn)) for plate in capture.plates)
+    plates = tuple(_pushing_up(turned(plate, turn)) for plate in capture.plates)
     return CapturedBody(upright, capture.rate, plates)
 
 
@@ -230,14 +231,21 @@ def _leg_length(joints: dict[str, Array]) -> float:
     return sum(float(np.median(np.linalg.norm(joints[a] - joints[b], axis=1))) for a, b in pairs) / 2
 
 
-def _upward(joints: dict[str, Array]) -> str:
-    """The axis along which the hips are above the heels most of the time."""
-    above = np.median(joints["hips"] - (joints["heel_l"] + joints["heel_r"]) / 2, axis=0)
-    axis = int(np.argmax(np.abs(above)))
-    return ("" if above[axis] > 0 else "-") + "XYZ"[axis]
+def axis_along(vectors: Array) -> str:
+    """The axis, one of `UPWARD`, along which vectors (F, 3) point most of the time.
+
+    Examples
+    --------
+    >>> axis_along(np.array([[0.1, -2.0, 0.0], [0.0, -1.0, 0.5], [3.0, 0.0, 0.0]]))
+    '-Y'
+    """
+    median = np.median(vectors, axis=0)
+    axis = int(np.argmax(np.abs(median)))
+    return ("" if median[axis] > 0 else "-") + "XYZ"[axis]
 
 
-def _turned(plate: Plate, turn: Array) -> Plate:
+def turned(plate: Plate, turn: Array) -> Plate:
+    """The plate under a rotation (3, 3)."""
     return Plate(plate.corners @ turn.T, plate.rate, plate.force @ turn.T, plate.moment @ turn.T)
 
 

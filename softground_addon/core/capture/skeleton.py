@@ -63,14 +63,20 @@ class Skeleton:
         Bone to world [m]: y from its head to its tail, x as `Bone.x_axis`.
     rate : float
         Frames per second [Hz].
+    at_rest : (B, 4, 4) float array, optional
+        Bone to world at rest [m], as the program knows it that the bones come from; by their ends and x axes if not
+        given.
     """
 
     bones: tuple[Bone, ...]
     poses: Array
     rate: float
+    at_rest: Array | None = None
 
     def rest(self) -> Array:
         """Bone to world at rest, (B, 4, 4) [m]."""
+        if self.at_rest is not None:
+            return self.at_rest
         return np.stack([_matrix(bone.head, bone.tail - bone.head, bone.x_axis) for bone in self.bones])
 
     def channels(self) -> Array:

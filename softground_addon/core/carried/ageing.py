@@ -15,6 +15,8 @@ WASH_OFF = 0.18
 and G. B. Boyd, EPA-R2-72-081, 1972, as in the Storm Water Management Model)."""
 MILLIMETRES_PER_HOUR = 1e-3 / weather.HOUR
 """In metres per second."""
+THINNEST, SLOWEST = 1e-9, 1e-15
+"""Mass [kg/m²] and melting rate [m/s] that are none, so that nothing is divided by 0."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,13 @@ def aged(mass: Any, age: Any, surface: SurfaceRecord | Liquid, drying: Any, rain
         Of the floor [°C].
     """
     assert surface.carried is not None
-    water, passed, melted = mass * (surface.carried.water / weather.WATER_DENSITY), age, 0.0
+    water = np.maximum(mass, THINNEST) * (surface.carried.water / weather.WATER_DENSITY)
+    passed, melted = age, 0.0
     if surface.melts:
         rate = weather.melting_rate(temperature)
-        melted = np.minimum(passed * rate / water, 1.0)
-        passed = np.maximum(passed - water / rate, 0.0) * np.greater(rate, 0.0)
+        melts = passed * rate
+        melted = np.minimum(melts / water, 1.0)
+        passed = np.maximum(melts - water, 0.0) / np.maximum(rate, SLOWEST)
     lost = passed * np.maximum(drying - rain, 0.0) * MILLIMETRES_PER_HOUR
     fallen = age * rain * (MILLIMETRES_PER_HOUR * 1e3)
     wet = weather.wetness(lost / water * weather.SURFACE_FILM)

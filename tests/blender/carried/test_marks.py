@@ -148,6 +148,36 @@ def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene,
     assert (tmp_path / "shot_marks_Crate_0084.exr") in paths
 
 
+def test_images_have_the_sliders_of_their_frame_where_they_are_keyed(scene):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    with_uv_map(crate)
+    set_input(obj, "Time Scale", 600.0)
+    modifier = obj.modifiers[0]
+    path = compat.input_path(modifier, node_modifiers.inputs_of(modifier)["Drying"])
+    for frame, drying in ((60, 0.0), (84, 2.0)):
+        set_input(obj, "Drying", drying)
+        obj.keyframe_insert(path, frame=frame)
+    at(scene, 60)
+    (image,) = mark_images.floor_images(obj, [crate], settings.units_of(scene), 256)
+    here, later = image.at(60), image.at(84)
+    assert here[here[:, 0] > 0, 1].min() == 1.0
+    mesh = at(scene, 84)
+    assert later[later[:, 0] > 0, 1].mean() == pytest.approx(
+        values(mesh, "wetness")[values(mesh, "mass") > 0].mean(), abs=0.1
+    )
+    assert later[later[:, 0] > 0, 1].mean() < 0.9
+    assert (image.at(84) == later).all()
+
+
+def test_images_of_marks_count_the_frames_of_a_scene_whose_time_is_remapped(scene):
+    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    with_uv_map(crate)
+    (image,) = mark_images.floor_images(obj, [crate], settings.units_of(scene), 64)
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200  # half as fast: nodes count half the frames
+    (slow,) = mark_images.floor_images(obj, [crate], settings.units_of(scene), 64)
+    assert slow.at(120)[:, 0] == pytest.approx(image.at(60)[:, 0])
+
+
 def test_images_have_marks_where_they_are_before_blender_has_updated_them(scene):
     obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
     with_uv_map(crate)

@@ -6,15 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
+from softground_addon.core.carried.ageing import aged
 from softground_addon.core.carried.hard_print import BEDDING, CLEARANCE, bedded, laid, sole_grid, swept
 from softground_addon.core.carried.marks import _pieces, marks_of
 from softground_addon.core.events.events import events
+from softground_addon.core.ground import surfaces
 from softground_addon.core.ground.hard_ground import HardOnSoft, Reach
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.surfaces import LIQUIDS
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.record.record import steps_of
+from softground_addon.core.weather import weather
 from tests.core.ground.test_hard_ground import SNOW, lifted, slab, standing_on
 from tests.core.prop_bodies import rolling
 from tests.core.walkers import box_sole, foot_sole, pose, pressed, walk
@@ -282,3 +285,30 @@ def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
     laid_marks = marks_of([loads], muted, terrain, surface=ground)
     assert not laid_marks.mass.any()
     assert laid_marks.with_steps(steps, {}).mass == pytest.approx(marks().mass)
+
+
+DRYING = 0.3
+"""[mm/h]"""
+
+
+@pytest.mark.parametrize("kind", ["snow", "mud", "water"])
+@pytest.mark.parametrize("temperature", [-5.0, 0.0, 8.0])
+def test_marks_age_without_a_warning_where_nothing_lies_or_melts(kind, temperature):
+    mass, age = np.array([0.0, 1e-12, 0.2, 0.2]), np.array([0.0, 1e4, 0.0, 1e8])
+    with np.errstate(all="raise", under="ignore"):
+        now = aged(mass, age, surfaces.sticking(kind), DRYING, 0.0, temperature)
+    frozen = kind == "snow" and temperature <= 0
+    assert now.wetness.tolist() == [1.0, float(frozen), 1.0, float(frozen)]
+    assert np.broadcast_to(now.melted, 4)[3] == (kind == "snow" and temperature > 0)
+
+
+@pytest.mark.parametrize("kind", ["snow", "mud", "water"])
+def test_marks_dry_by_the_law_of_weather_and_snow_once_it_has_melted(kind):
+    surface, mass, age = surfaces.sticking(kind), 0.2, np.array([0.1, 0.5, 1.0, 1.5, 3.0]) * 3600.0
+    water, melting = mass * surface.carried.water / 1000.0, weather.melting_rate(8.0)
+    until = water / melting if kind == "snow" else 0.0
+    now = aged(np.full(5, mass), age, surface, DRYING, 0.0, 8.0)
+    lost = np.maximum(age - until, 0.0) * DRYING * 1e-3 / 3600.0
+    assert now.wetness == pytest.approx(weather.wetness(lost * weather.SURFACE_FILM / water), abs=1e-12)
+    if kind == "snow":
+        assert now.melted == pytest.approx(np.minimum(age / until, 1.0), rel=1e-12)
