@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, floor
+from math import ceil, floor, isclose
 from typing import Any
 
 import bpy
@@ -21,7 +21,7 @@ from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_ar
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, time_stretch_of
-from .import_fixes import is_captured, put_under, size_of, stature_of
+from .import_fixes import is_captured, mass_of, put_under, size_of, stature_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
@@ -64,8 +64,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     character.name = armature.name
     character.armature = armature
     _fill(scene.unit_settings.scale_length, character, mapping)
-    if mapping.mass:
-        character.mass = mapping.mass
+    character.mass = mass_of(character) or character.mass
     settings.active_character = len(settings.characters) - 1
     take_frames(scene, animated_frames(scene, armature))
     character.sole_length = length
@@ -98,7 +97,7 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     character = settings.characters.add()
     character.name, character.body = name.name, resolve(name)
     _fill(scene.unit_settings.scale_length, character, recognised.mapping)
-    character.mass = recognised.mapping.mass or character.mass
+    character.mass = mass_of(character) or character.mass
     settings.active_character = len(settings.characters) - 1
     stretch = time_stretch_of(scene)
     take_frames(scene, (round(frames[0] * stretch), round(frames[1] * stretch)))
@@ -193,11 +192,11 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
     put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3
-    by_volume = character.mass == character.skin_mass
+    is_typed = not isclose(character.mass, mass_of(character), rel_tol=1e-6)
     character.size, character.sole_length = character.size * factor, character.sole_length * factor
     character.skin_mass = float(f"{character.skin_mass * factor**3:.2g}")
-    if by_volume:
-        character.mass = character.skin_mass
+    if not is_typed:
+        character.mass = mass_of(character)
     fit_cells(scene.softground)
     return factor
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.people import has_two_legs
+from ...core.motion.people import has_two_legs, likely_mass
 from ...core.rig.bones import extent, stature
 from ..compat import action_curves
 from ..rigs.frame_ranges import ancestors
@@ -30,6 +30,11 @@ def stature_of(unit_scale: float, armature: bpy.types.Object) -> float:
 def has_legs(character: Any) -> bool:
     """True if a character stands on two legs, as people do."""
     return has_two_legs(character.joints.keys(), len(character.soles))
+
+
+def mass_of(character: Any) -> float:
+    """Likely mass of a character by its skin, or by its height where its skin is too large for it [kg]; 0 without one."""
+    return likely_mass(character.skin_mass, character.size, two_legs=has_legs(character))[0]
 
 
 def is_captured(character: Any) -> bool:
@@ -69,7 +74,7 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
 
 
 def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDArray[np.float64]) -> None:
-    """Let a character that walks on the spot travel at a velocity (2,) [m/s] over the frames of the bake.
+    """Let a character that walks on the spot travel at a velocity (2,) [m/s], also beyond the frames of the bake.
 
     Raises
     ------
@@ -85,5 +90,6 @@ def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDA
     assert empty.animation_data is not None
     assert empty.animation_data.action is not None
     for curve in action_curves(empty.animation_data.action):
+        curve.extrapolation = "LINEAR"
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"

@@ -9,10 +9,9 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core.errors import InputError
-from ...core.motion.people import likely_mass
 from .. import jobs, settings
 from ..characters import character_setup, contact_editing
-from ..characters.import_fixes import has_legs, walk_ahead
+from ..characters.import_fixes import mass_of, walk_ahead
 from ..operator_base import reports_errors
 from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
@@ -78,9 +77,9 @@ MUCH = 2.0
 
 def suggested_mass(character: Any) -> float:
     """Mass that a character's skin or its height suggests where its own differs much [kg], 0 where it does not."""
-    likely, _ = likely_mass(character.skin_mass, character.size, two_legs=has_legs(character))
+    likely = mass_of(character)
     differs = likely > 0 and not likely / MUCH < character.mass < likely * MUCH
-    return float(likely) if differs else 0.0
+    return likely if differs else 0.0
 
 
 class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
@@ -96,8 +95,7 @@ class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
         character = active_character(settings.options_of(context))
         if not character.skin_mass > 0:
             raise InputError(f"'{character_setup.title_of(character)}' has no skin to go by: type its mass.")
-        legs = has_legs(character)
-        character.mass, _ = likely_mass(character.skin_mass, character.size, two_legs=legs)
+        character.mass = mass_of(character)
         return {"FINISHED"}
 
 

@@ -61,7 +61,8 @@ class _BakeFootprints(_Pressing):
         )
         steps: Any = result.report["steps"]
         scene = settings.scene_of(bpy.context)
-        if steps and all(scene.frame_current < step["frame_start"] for step in steps):
+        seen_from = "frame_end" if self._is_first else "frame_start"  # a first bake shows what a foot has left
+        if steps and all(scene.frame_current < step[seen_from] for step in steps):
             if bpy.app.background:
                 text = translated("{summary}. Press Play to see them", summary=text)
             else:  # the ground would look as it did before

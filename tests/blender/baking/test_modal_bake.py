@@ -286,11 +286,12 @@ def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
     result = jobs.run(bake_job.bake(scene, write=False))
     first = min(step["frame_start"] for step in result.report["steps"])
     reports = []
-    operator = SimpleNamespace(report=lambda _kind, text: reports.append(text), _is_first=False)
-    for frame in (int(first) - 1, int(first) + 1):
-        scene.frame_set(frame)
+    for is_first, frame in ((False, first - 1), (False, first + 1), (True, first + 1)):
+        operator = SimpleNamespace(report=lambda _kind, text: reports.append(text), _is_first=is_first)
+        scene.frame_set(int(frame))
         modal_bake.SOFTGROUND_OT_bake._show(operator, result)
-    assert [text.endswith(". Press Play to see them") for text in reports if "steps" in text] == [True, False]
+    of_steps = [text for text in reports if "steps" in text]
+    assert [text.endswith(". Press Play to see them") for text in of_steps] == [True, False, True]
 
 
 def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):

@@ -110,6 +110,11 @@ def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
     for ours, other in zip(report["steps"], steps, strict=True):
         assert ours["position"][:2] == pytest.approx(other["position"][:2], abs=0.12)
     assert belt.parent.name == "Walker Travel"
+    places = []
+    for frame in (62, 72, 82):  # the walk may be repeated later
+        scene.frame_set(frame)
+        places.append(belt.parent.matrix_world.translation[:2])
+    assert np.diff(places, axis=0)[1] == pytest.approx(np.diff(places, axis=0)[0], rel=1e-4)
 
 
 @pytest.mark.parametrize(
