@@ -34,8 +34,11 @@ CONTINUATION = 1.0
 def without_holds(motion: CharacterMotion) -> CharacterMotion:
     """The motion between stepped keys, where poses are held for a few frames each.
 
-    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated.
+    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated. Soles alone do not
+    tell held poses from feet that all stand while their body goes on.
     """
+    if not motion.joints and motion.skin is not None:
+        return motion
     held = _held(motion)
     if not held.any():
         return motion

@@ -1,4 +1,4 @@
-"""One walk as files bring it: at other rates, in the NLA, with more in the rig; its steps and loads stay what they are."""
+"""One walk as files bring it, at other rates, in the NLA, with more in the rig: its steps and loads stay the same."""
 
 from collections.abc import Callable
 

@@ -1,9 +1,12 @@
 """Stepped keys bridged and loops continued, so that derivatives mean something."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from softground_addon.core.dynamics.continuation import continued, without_holds
+from softground_addon.core.motion.motion import LowSkin
 from tests.core.character import character, flat_sole
 
 RATE = 24.0
@@ -38,6 +41,13 @@ def test_keys_on_twos_become_the_smooth_motion_between_them():
 def test_a_motion_without_holds_stays_what_it_is():
     motion = walker(49)
     assert without_holds(motion) is motion
+
+
+def test_feet_that_all_stand_are_no_hold_where_nothing_else_is_known_of_a_body_but_its_skin():
+    motion = walker(49, hold=2)
+    skin = LowSkin(motion.frames, np.zeros((49, 1, 3)), np.zeros((49, 1)), 0.3, 1.78)
+    alone = replace(motion, joints={}, skin=skin)
+    assert without_holds(alone) is alone
 
 
 def test_a_rest_is_no_hold():
