@@ -35,15 +35,17 @@ def without_holds(motion: CharacterMotion) -> CharacterMotion:
     """The motion between stepped keys, where poses are held for a few frames each.
 
     Every pose stays at the frame where it first shows; the frames that repeat it are interpolated. Soles alone do not
-    tell held poses from feet that all stand while their body goes on.
+    tell held poses from feet that all stand while their body goes on: without joints, skin bears when it did.
     """
-    if not motion.joints and motion.skin is not None:
-        return motion
     held = _held(motion)
     if not held.any():
         return motion
     known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
-    return _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+    smooth = _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+    if motion.joints:
+        return smooth
+    pairs = zip(smooth.soles, motion.soles, strict=True)
+    return dataclasses.replace(smooth, soles=tuple(dataclasses.replace(new, bears=sole.bears) for new, sole in pairs))
 
 
 def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:

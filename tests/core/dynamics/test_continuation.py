@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from softground_addon.core.dynamics.continuation import continued, without_holds
-from softground_addon.core.motion.motion import LowSkin
 from tests.core.character import character, flat_sole
 
 RATE = 24.0
@@ -43,11 +42,14 @@ def test_a_motion_without_holds_stays_what_it_is():
     assert without_holds(motion) is motion
 
 
-def test_feet_that_all_stand_are_no_hold_where_nothing_else_is_known_of_a_body_but_its_skin():
-    motion = walker(49, hold=2)
-    skin = LowSkin(motion.frames, np.zeros((49, 1, 3)), np.zeros((49, 1)), 0.3, 1.78)
-    alone = replace(motion, joints={}, skin=skin)
-    assert without_holds(alone) is alone
+@pytest.mark.parametrize("known", [True, False])
+def test_feet_bear_as_their_skin_does_where_they_all_stand_and_no_joint_tells_whether_the_pose_is_held(known):
+    path = np.repeat([0.0, 0.0, 0.1, 0.2, 0.2, 0.3], [6, 1, 1, 1, 5, 1])[:, None] * (1, 0, 0)
+    bears = np.repeat([True, False, True, False], [7, 1, 6, 1])
+    sole = replace(flat_sole(path), bears=bears)
+    motion = character([sole], rate=RATE, hips=path + np.array((0, 0, 0.9)))
+    smooth = without_holds(motion if known else replace(motion, joints={}))
+    assert (smooth.soles[0].bears == bears).all() != known
 
 
 def test_a_rest_is_no_hold():
