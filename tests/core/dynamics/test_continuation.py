@@ -11,23 +11,16 @@ from tests.core.character import character, flat_sole
 RATE = 24.0
 
 
-def walker(frames, *, period=24, speed=1.0, hold=1, finer=1, eases=False):
-    """A body that bobs and moves on, its pose updated every `hold` frames, seen `finer` times a frame.
-
-    Where it `eases`, its first frame begins and its last one ends at rest.
-    """
-    time = (np.arange((frames - 1) * finer + 1) // hold * hold) / finer
-    if eases:
-        first, last = np.clip(1 - time, 0, 1), np.clip(time - frames + 2, 0, 1)
-        time = time + last**2 - last**3 - first**2 + first**3
-    time /= RATE
+def walker(frames, *, period=24, speed=1.0, hold=1):
+    """A body that bobs and moves on, its pose updated every `hold` frames."""
+    time = (np.arange(frames) // hold * hold) / RATE
     phase = 2 * np.pi * time * RATE / period
     hips = np.stack([speed * time, 0.02 * np.sin(phase), 0.9 + 0.03 * np.cos(2 * phase)], axis=1)
     feet = [
         flat_sole(np.stack([speed * time + 0.2 * np.sin(phase + side), 0 * time, 0 * time], axis=1))
         for side in (0.0, np.pi)
     ]
-    return character(feet, rate=RATE * finer, hips=hips)
+    return character(feet, rate=RATE, hips=hips)
 
 
 def test_keys_on_twos_become_the_smooth_motion_between_them():
@@ -71,17 +64,6 @@ def test_a_loop_and_a_gait_go_on_as_the_longer_walk(frames, speed):
     assert longer.joints["hips"] == pytest.approx(expected, abs=1e-9)
     assert longer.frames[given][0] == 1.0
     assert np.diff(longer.frames) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("finer", [2, 4, 5, 10])
-def test_ends_that_ease_in_and_out_between_frames_are_those_of_the_walk(finer):
-    longer, given = continued(walker(61, finer=finer, eases=True))
-    start, stop = given.start / finer / RATE, (given.start + len(longer.frames) - given.stop) / finer / RATE
-    assert start > 0.2
-    assert stop > 0.4
-    time = np.arange(len(longer.frames)) / finer / RATE - start
-    assert longer.joints["hips"][:, 0] == pytest.approx(time, abs=3e-3)
-    assert longer.joints["hips"][:, 2] == pytest.approx(0.9 + 0.03 * np.cos(4 * np.pi * time), abs=3e-3)
 
 
 def test_the_given_frames_stay_as_given():
