@@ -25,8 +25,6 @@ LIKE_POSE = 0.05
 """Poses are alike when joints and soles are this near on average, in leg lengths (5 cm for an adult)."""
 VELOCITY_WEIGHT = 0.3
 """A difference of velocity counts as one of position after this time, in sqrt(leg length/gravity) (0.1 s)."""
-VELOCITY_SPAN = 0.15
-"""Time over which a velocity is taken, in the same unit (45 ms): keys that ease in and out end at rest."""
 CONTINUATION = 1.0
 """How far a motion is continued beyond each end, in the same unit (0.3 s)."""
 
@@ -34,13 +32,18 @@ CONTINUATION = 1.0
 def without_holds(motion: CharacterMotion) -> CharacterMotion:
     """The motion between stepped keys, where poses are held for a few frames each.
 
-    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated.
+    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated. Soles alone do not
+    tell held poses from feet that all stand while their body goes on: without joints, skin bears when it did.
     """
     held = _held(motion)
     if not held.any():
         return motion
     known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
-    return _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+    smooth = _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+    if motion.joints:
+        return smooth
+    pairs = zip(smooth.soles, motion.soles, strict=True)
+    return dataclasses.replace(smooth, soles=tuple(dataclasses.replace(new, bears=sole.bears) for new, sole in pairs))
 
 
 def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
@@ -48,7 +51,6 @@ def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
 
     After the last pose comes what followed the pose most like it, before the first one what preceded its like: exact
     for loops, near for a few strides of a gait and for standing still. Where no pose is like it, the motion ends.
-    What shorter samples than `VELOCITY_SPAN` show of the ends themselves, the ease of their keys, gives way to it.
 
     Returns
     -------
@@ -60,18 +62,15 @@ def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
     margin = max(1, round(CONTINUATION * motion.pendulum_time / motion.time_step))
     if count < 2 * margin:
         return motion, slice(0, count)
-    span = _span(motion)
-    ease = span if span > 1 else 0
-    begin, end = ease, count - 1 - ease
-    before = _most_like(motion, begin, np.arange(margin + ease, count))
-    after = _most_like(motion, end, np.arange(count - margin - ease))
+    before = _most_like(motion, 0, np.arange(margin, count))
+    after = _most_like(motion, count - 1, np.arange(count - margin))
 
     def extended(samples: Array) -> Array:
-        pieces = [samples[begin if before is not None else 0 : end + 1 if after is not None else count]]
+        pieces = [samples]
         if before is not None:
-            pieces.insert(0, samples[before - margin - ease : before] + _offset(samples, begin, before))
+            pieces.insert(0, samples[before - margin : before] + _offset(samples, 0, before))
         if after is not None:
-            pieces.append(samples[after + 1 : after + 1 + margin + ease] + _offset(samples, end, after))
+            pieces.append(samples[after + 1 : after + 1 + margin] + _offset(samples, count - 1, after))
         return np.concatenate(pieces)
 
     longer = _mapped(motion, extended)
@@ -82,26 +81,19 @@ def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
     return dataclasses.replace(longer, frames=frames), slice(first, first + count)
 
 
-def _span(motion: CharacterMotion) -> int:
-    """Steps over which a velocity is taken."""
-    return max(1, round(VELOCITY_SPAN * motion.pendulum_time / motion.time_step))
-
-
 def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) -> int | None:
     """The one of `others` whose pose and velocity are most like those at an end of the motion, if any are alike."""
     paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
     count = len(motion.frames)
-    span = _span(motion)
-    forward = frame < count // 2
 
     def points(frames: NDArray[np.intp]) -> Array:
         places = np.stack([path[frames] for path in paths], axis=1)
         return places - places.mean(axis=1, keepdims=True) * (1.0, 1.0, 0.0)
 
     def velocity(frames: NDArray[np.intp]) -> Array:
-        # One-sided, as at the end itself: from the steps after the first frame, from the steps before the last.
-        start = np.clip(frames if forward else frames - span, 0, count - 1 - span)
-        return (points(start + span) - points(start)) / (span * motion.time_step)
+        # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
+        start = np.clip(frames - (frame > 0), 0, count - 2)
+        return (points(start + 1) - points(start)) / motion.time_step
 
     here = np.array([frame])
     weight = VELOCITY_WEIGHT * motion.pendulum_time

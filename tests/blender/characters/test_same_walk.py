@@ -1,4 +1,4 @@
-"""One walk as files bring it: at other rates, in the NLA, with more in the rig; its steps and loads stay what they are."""
+"""One walk as files bring it, at other rates, in the NLA, with more in the rig: its steps and loads stay the same."""
 
 from collections.abc import Callable
 
@@ -82,4 +82,5 @@ def test_a_walk_keeps_its_steps_and_its_loads(addon, change):
     others, other_mass = steps_of(CHANGES[change])
     assert other_mass == pytest.approx(mass, rel=0.02)
     assert others[:, :2] == pytest.approx(steps[:, :2], abs=0.045)
-    assert others[:, 2] == pytest.approx(steps[:, 2], rel=0.1)
+    whole = slice(2, -1)  # what a shot cuts off is bridged from its other strides, which depends on its samples
+    assert others[whole, 2] == pytest.approx(steps[whole, 2], rel=0.03)
