@@ -6,9 +6,14 @@ ROWS: list[tuple[str, float, float, str]] = []
 """What was measured, its value, the most that it may be, and the unit of both."""
 
 
+def note(what: str, value: float, most: float = inf, unit: str = "times") -> None:
+    """Note a value in the table."""
+    ROWS.append((what, float(value), float(most), unit))
+
+
 def below(what: str, value: float, most: float = inf, unit: str = "times") -> None:
     """Note a value in the table; AssertionError where it is more than its bar, if it has one."""
-    ROWS.append((what, float(value), float(most), unit))
+    note(what, value, most, unit)
     assert value <= most, f"{what}: {value:.3g} {unit}, bar {most:.3g}"
 
 

@@ -1,21 +1,25 @@
 """What a whole bake costs against what Blender needs to step through the same shot; in processor time."""
 
 import time
+from math import inf
 
 import bpy
+import numpy as np
 import pytest
 
 from softground_addon.blender import jobs, reuse
 from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
-from tests.benchmarks.bars import below
+from tests.benchmarks.bars import below, note
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
 
 pytestmark = pytest.mark.benchmark
 
 FRAMES = 250
+DEEP_FRAMES = 60
 
 
 def bare_frames(scene):
@@ -152,3 +156,49 @@ def test_a_bake_after_a_change_works_out_only_what_follows_from_it(scene, settin
         took[bool(number % 2)].append(seconds_to_bake(scene))
     whole, again = min(took[True]), min(took[False][1:])
     below(f"a bake after a change of {setting} over a whole one", again / whole, share)
+
+
+@pytest.mark.parametrize("cell", [0.01, 0.005])
+def test_a_bake_with_carving_takes_little_longer_and_plays_as_fast(scene, cell):
+    shots.walker(scene, frames=DEEP_FRAMES, coarseness=1.0)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.frame_end, options.cell_size, options.sink_feet = DEEP_FRAMES, cell, True
+    options.pressure, options.material.layer_depth = "CENTRE_OF_PRESSURE", 0.6
+    options.material.youngs_modulus, options.material.poisson_ratio = 123e3, 0.0  # in which it sinks 35 cm
+    baked, played, recorded = {}, {}, {}
+    for turn in range(3):
+        for options.carve in (False, True):
+            seconds = _anew(scene)
+            mesh = baked_ground.display_mesh_of(options.ground).data
+            recorded[options.carve] = len(bytes(mesh[ground_mesh.RECORD]))
+            frames = _least_of_frames(scene, range(2, DEEP_FRAMES, 3))
+            if turn:  # the first makes the ground
+                baked[options.carve] = min(seconds, baked.get(options.carve, inf))
+            played[options.carve] = np.minimum(frames, played.get(options.carve, inf))
+    steps = len(baked_ground.record_of(options.ground).carves)
+    of_cells = f"cells of {cell * 1e3:g} mm"
+    rows = (
+        (f"a bake with carving over one without, {of_cells}", baked[True] / baked[False], 1.6, "times"),
+        (f"a frame of it over one without, {of_cells}", played[True].mean() / played[False].mean(), 1.15, "times"),
+        (
+            f"its record over one without, {of_cells}",
+            (recorded[True] - recorded[False]) / steps / 1e6,
+            0.4,
+            "MB a step",
+        ),
+    )
+    for what, value, most, unit in rows:
+        note(what, value, most, unit)
+    assert all(value <= most for _, value, most, _ in rows)
+
+
+def _least_of_frames(scene, frames, turns=2):
+    """Least time of the clock that each frame takes [s], (F,)."""
+    taken = np.full((turns, len(frames)), inf)
+    for turn in range(turns):
+        for number, frame in enumerate(frames):
+            started = time.perf_counter()
+            scene.frame_set(frame)
+            taken[turn, number] = time.perf_counter() - started
+    return taken.min(axis=0)

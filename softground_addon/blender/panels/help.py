@@ -23,6 +23,7 @@ PAGES = (
     ("bpy.ops.softground.*steps", "steps.html"),
     ("bpy.ops.softground.tilt_preset", "response.html#tilt"),
     ("bpy.types.softgroundtilt.*", "response.html#tilt"),
+    ("bpy.ops.softground.response_preset", "response.html#acting-in-deep-ground"),
     ("bpy.ops.softground.slow_down", "response.html#acting-in-deep-ground"),
     ("bpy.ops.softground.sink_feet", "response.html#grounding"),
     ("bpy.types.softgroundgrounding.*", "response.html#grounding"),

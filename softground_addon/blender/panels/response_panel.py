@@ -20,6 +20,8 @@ from ..translation import translated
 
 CENTRE_HEIGHT = 0.62
 """Height of a standing body's centre of mass over that of its joints at rest, by the masses of de Leva (1996)."""
+WADING_ARMS, WADING_TILT = 0.5, 0.1
+"""Arms Out and Tilt's Strength of who wades: by eye; with more tilt knees bend further than without."""
 _SHOWN = 5
 """Frames with gaps that the panel lists."""
 
@@ -66,6 +68,44 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
             "PAPER": body_gains(*PAPER_TORQUES, **body),
         }[self.source]
         scene.softground.tilt.frequency, scene.softground.tilt.damping = gains.frequency, gains.damping
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_response_preset(bpy.types.Operator):
+    """Choose how arms, trunk and speed respond to deep ground. Bake again afterwards"""
+
+    bl_idname = "softground.response_preset"
+    bl_label = "Response Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: EnumProperty(
+        name="Preset",
+        items=[
+            ("AS_ANIMATED", "As Animated", "Arms and trunk move as they are animated"),
+            (
+                "WADING",
+                "Wading",
+                "Arms are held out and the body sways for balance. After a bake, time is stretched to the speed at "
+                "which people would walk on this ground",
+            ),
+        ],
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        options, wades = scene.softground, self.preset == "WADING"
+        for part in settings.PERFORMANCE:
+            setattr(options.grounding, part, 0.0)
+        options.grounding.arms, options.tilt.use = WADING_ARMS * wades, wades
+        if wades:
+            options.tilt.strength = WADING_TILT
+        else:
+            options.tilt.property_unset("strength")
+        character = active_character(options)
+        if wades and character and character.armature and has_layer(character.armature):
+            settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
+        elif (scene.render.frame_map_old, scene.render.frame_map_new) == tuple(options.slowed_time):
+            settings.slow_down(scene, 1.0)
         return {"FINISHED"}
 
 
@@ -204,6 +244,7 @@ class SOFTGROUND_PT_response(CharacterPanel, bpy.types.Panel):
         layout = self.fields()
         options = settings.options_of(context)
         layout.prop(options, "output")
+        layout.operator_menu_enum("softground.response_preset", "preset")
         column = _group(layout, options.grounding, ("align", "lock"))
         column.active |= settings.sinks_feet(options)
         column = _group(layout, options.tilt, ("strength", "lateral", "frequency", "damping"))
@@ -251,6 +292,7 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
 
 CLASSES = (
     SOFTGROUND_OT_tilt_preset,
+    SOFTGROUND_OT_response_preset,
     SOFTGROUND_OT_show_frame,
     SOFTGROUND_OT_slow_down,
     *_REMOVE.values(),

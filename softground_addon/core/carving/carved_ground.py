@@ -15,7 +15,6 @@ from ..ground.sparse_grid import TILE, SampledGrid, Window
 from ..ground.variation import VariationTiles
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.interpolation import cubic
-from ..numerics.triangles import cross
 from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
@@ -93,14 +92,14 @@ def numbered(corners: Indices, count: int) -> tuple[Indices, Indices]:
 
 
 def _below(moves: Array, corners: Indices, sides: Array) -> Mask:
-    """True for triangles (3, T) but those that face up at both ends of a frame, (T,); vertices (2, V, 3) at these."""
-    (a, b, c) = (moves[..., :2].take(corner, axis=1) for corner in corners)
-    above: Mask = (sides * cross(b - a, c - a) > 0).all(axis=0)
+    """True for triangles (3, T) but those that face up at both ends of a frame, (T,); vertices (2, 3, V) at these."""
+    (a, p), (b, q), (c, r) = (moves[:, :2].take(corner, axis=2).swapaxes(0, 1) for corner in corners)
+    above: Mask = (sides * ((b - a) * (r - p) - (c - a) * (q - p)) > 0).all(axis=0)
     return ~above
 
 
 def _passed(around: Array, corners: Indices, needed: Array) -> tuple[Array, Indices]:
-    """Places (N, 3) that vertices (4, V, 3) pass from the second to the third of these times [m], and triangles there.
+    """Places (3, N) that vertices (4, 3, V) pass from the second to the third of these times [m], and triangles there.
 
     Each triangle (3, T) is there as often as those of its vertices need (V,) that move most.
     """
@@ -112,7 +111,7 @@ def _passed(around: Array, corners: Indices, needed: Array) -> tuple[Array, Indi
     for number in np.flatnonzero(np.bincount(of_triangle)).tolist():
         part = corners[:, of_triangle == number]
         drawn += [part + len(count) * (-(-poses * pose // number) - 1) for pose in range(1, number + 1)]
-    return (between @ around.reshape(4, -1)).reshape(-1, 3), np.concatenate(drawn, axis=1).T
+    return (between @ around.swapaxes(0, 1)).reshape(3, -1), np.concatenate(drawn, axis=1)
 
 
 class CarvedGround:
@@ -173,37 +172,38 @@ class CarvedGround:
             step.release()
 
     def drawn(self, part: Part, around: Array) -> Drawn | None:
-        """A part of a body over a frame, None if none of it is near the ground; from its vertices (4, V, 3) around it.
+        """A part of a body over a frame, None if none of it is near the ground; from its vertices (4, 3, V) around it.
 
         What is in the ground is drawn all the way, what only hovers over it at the end.
         """
-        moves, cell_size = around.take(part.vertices, axis=1), self._cell_size
+        moves, cell_size = around.take(part.vertices, axis=2), self._cell_size
         if not part.step.is_deep or not np.isfinite(moves).all():
             return None
-        lowest = moves[1:3, :, 2].min(axis=0)
-        top = self._tops.read(self._box(moves[1:3].reshape(-1, 3))).max()
+        lowest = moves[1:3, 2].min(axis=0)
+        top = self._tops.read(self._box(moves[1:3].swapaxes(0, 1))).max()
         low = lowest < top + HIGHEST  # what is laid in this frame heaps up
         near = np.flatnonzero(np.logical_or.reduce([low.take(corner) for corner in part.corners]))
-        used, corners = numbered(part.corners.take(near, axis=1), len(low))
-        moves = moves.take(used, axis=1)
-        corners = corners[:, _below(moves[1:3], corners, part.sides.take(near))]
+        corners = part.corners.take(near, axis=1)
+        corners = corners.compress(_below(moves[1:3], corners, part.sides.take(near)), axis=1)
         if not corners.size:
             return None
-        way = (moves[2] - moves[1])[:, :2]
-        distance = np.hypot(*way.T) * (lowest < top).take(used)
+        used, corners = numbered(corners, len(low))
+        moves = moves.take(used, axis=2)
+        way = (moves[2] - moves[1])[:2]
+        distance = np.hypot(*way) * (lowest < top).take(used)
         places, triangles = _passed(moves, corners, np.clip(distance / part.step.spacing, 1.0, MOST_POSES))
         window = self._box(places)
         apart = cell_size / SAMPLES
         origin = np.array((window.column, window.row)) * cell_size + apart / 2
         shape = window.rows * SAMPLES, window.columns * SAMPLES
-        underside = lowest_surface(places, triangles, origin, shape, apart)
+        underside = lowest_surface(places.T, triangles.T, origin, shape, apart)
         of_cells = underside.reshape(window.rows, SAMPLES, window.columns, SAMPLES).transpose(1, 3, 0, 2)
-        return Drawn(part.step, window, of_cells.reshape(-1, window.rows, window.columns), way[distance.argmax()])
+        return Drawn(part.step, window, of_cells.reshape(-1, window.rows, window.columns), way[:, distance.argmax()])
 
     def _box(self, places: Array) -> Window:
-        """The cells around places (N, 3)."""
-        x, y, _ = places.T
-        return Window.around(np.array((x.min(), y.min())), np.array((x.max(), y.max())), self._cell_size)
+        """The cells around places (3, ...)."""
+        low, high = (np.array([end(along) for along in places[:2]]) for end in (np.min, np.max))
+        return Window.around(low, high, self._cell_size)
 
     def carve(self, part: Drawn, bodies: Sequence[Drawn], frame: float) -> None:
         """Cut the ground to one of the parts of bodies that are drawn."""
@@ -215,8 +215,8 @@ class CarvedGround:
         window = cut.expanded(self._margin)
         cells, channels = self._read(window)
         underside = np.full(cells.lowest.shape, np.inf)
-        shared = window.intersection(part.window)
-        underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
+        if (shared := window.intersection(part.window)) is not None:
+            underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
         cells.cut(np.maximum(underside, channels[2]), part.way, walls.packing, _lowest(bodies, window), again=again)
         self._write(step, window, cells, channels, frame)
@@ -255,7 +255,12 @@ class CarvedGround:
             cells, channels = self._read(window)
             if not holds and frames == self._frames_to_rest:
                 cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
-            cells.slide(step.walls, self._held(bodies, window, cells), (window.row, window.column), ceil(sweeps / self._frames_to_rest))
+            cells.slide(
+                step.walls,
+                self._held(bodies, window, cells),
+                (window.row, window.column),
+                ceil(sweeps / self._frames_to_rest),
+            )
             if holds and frames == 1:
                 cells.gather(channels[6] * QUANTUM, THIN)
             if frames == 1:

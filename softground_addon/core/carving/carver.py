@@ -14,6 +14,7 @@ Terzaghi 1943, "Theoretical Soil Mechanics", doi:10.1002/9780470172766: the heig
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, pi, tan
 
 import numpy as np
@@ -259,23 +260,22 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
     reach, length = max(round(REACH / cell_size), 1), float(np.hypot(*way))
     ahead = np.rint(way[::-1] / length * reach).astype(int) if length > 0 else np.zeros(2, int)
-    rows, columns = (np.flatnonzero(thrown.any(axis=axis)) for axis in (1, 0))
-    first, last = np.array((rows[0], columns[0])), np.array((rows[-1], columns[-1])) + 1
-    spread = np.pad(thrown[first[0] : last[0], first[1] : last[1]], 2 * reach)
-    for axis in (0, 1, 0, 1):
-        spread = _box_mean(spread, reach | 1, axis)
-    beyond = 4 * reach
-    laid = np.zeros((thrown.shape[0] + 2 * beyond, thrown.shape[1] + 2 * beyond))
-    for shift in (np.zeros(2, int), ahead):
-        row, column = first + shift + beyond - 2 * reach
-        laid[row : row + len(spread), column : column + spread.shape[1]] += spread
-    return np.where(laid > THINNEST * laid.max(), laid, 0.0)[beyond:-beyond, beyond:-beyond]
+    over_rows, over_columns = (_smoothing(count, reach | 1) for count in thrown.shape)
+    laid = over_rows @ thrown @ over_columns
+    to, since = (
+        tuple(
+            slice(max(sign * step, 0), count + min(sign * step, 0))
+            for step, count in zip(ahead, laid.shape, strict=True)
+        )
+        for sign in (1, -1)
+    )
+    spread = laid.copy()
+    laid[to] += spread[since]
+    return np.where(laid > THINNEST * laid.max(), laid, 0.0)
 
 
-def _box_mean(values: Array, width: int, axis: int) -> Array:
-    """Means of values (rows, columns) over an odd number of cells along an axis; beyond their edge there is nothing."""
-    around = [(0, 0), (0, 0)]
-    around[axis] = (width // 2 + 1, width // 2)
-    sums = np.cumsum(np.pad(values, around), axis=axis)
-    after, before = (np.take(sums, np.arange(first, first + values.shape[axis]), axis=axis) for first in (width, 0))
-    return np.asarray((after - before) / width)
+@lru_cache(64)
+def _smoothing(count: int, width: int) -> Array:
+    """The matrix (count, count) that takes means over an odd number of cells twice; nothing is beyond the edges."""
+    away = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    return np.maximum(width - away, 0) / width**2

@@ -13,6 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..ground.hard_ground import bare
+from ..ground.heightfield import Terrain
 from ..ground.regions import GroundKind
 from ..ground.soft_ground import SoftGround
 from ..ground.surfaces import find
@@ -31,6 +33,8 @@ from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
 
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
+NEAR = 0.4
+"""Skin of bones that are further above the ground at all times is left out [m]: nothing is heaped up so high."""
 
 
 @sliced
@@ -106,7 +110,7 @@ def carves_of(
     }
     carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
-    bodies = [_Body(name, soles, skin, taken) for name, soles, skin in skins]
+    bodies = [_Body(name, soles, skin, taken, bare(ground.terrain)) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
@@ -154,18 +158,26 @@ def _walls(footprint: Footprint, ground: SoftGround, surface: str) -> Walls:
 class _Body:
     """A character's skin, part by part, and the steps that these parts take."""
 
-    def __init__(self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep]) -> None:
-        self.poses = _poses(skin)
+    def __init__(
+        self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep], terrain: Terrain
+    ) -> None:
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
         every = list(skin.triangles.values())
         outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
+        near = skin.near(terrain, NEAR)
+        used = numbered(np.concatenate([each[near[each].any(axis=1)] for each in every]).T, len(near))[0]
+        self.poses = _poses(skin, used)
         for (sole, triangles), sides in zip(skin.triangles.items(), outward, strict=True):
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
-            if taken:
-                self._parts.append((sole, taken, _nearest(taken, skin.frames), *numbered(triangles.T, len(places)), sides))
+            is_near = near[triangles].any(axis=1)
+            if taken and is_near.any():
+                of_used = np.searchsorted(used, triangles[is_near].T)
+                self._parts.append(
+                    (sole, taken, _nearest(taken, skin.frames), *numbered(of_used, len(used)), sides[is_near])
+                )
 
     def parts(self, number: int) -> list[Part]:
         """The step that each part is nearest to at a frame, with the part."""
@@ -189,12 +201,12 @@ def _nearest(steps: Sequence[CarvedStep], frames: Array) -> Indices:
     return nearest
 
 
-def _poses(skin: RespondedSkin) -> Iterator[Array]:
-    """The vertices a frame ago, at each frame, and at the neighbours of both, (4, V, 3) [m], frame by frame."""
+def _poses(skin: RespondedSkin, vertices: Indices) -> Iterator[Array]:
+    """Vertices a frame ago, at each frame, and at the neighbours of both, (4, 3, V) [m], frame by frame."""
     count, starts = len(skin.frames), {0, *skin.jumps}
     for first in range(0, count, FRAMES_AT_ONCE):
         end = min(first + FRAMES_AT_ONCE, count)
-        places = skin.at(np.arange(first - 2, end + 1).clip(0, count - 1))
+        places = np.swapaxes(skin.at(np.arange(first - 2, end + 1).clip(0, count - 1), vertices), 1, 2)
         for number in range(first, end):
             before = number - (number not in starts)
             further = before - (before not in starts)

@@ -9,9 +9,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground.heightfield import Terrain
 from ..legs.grounding import Response, leg_soles
 from ..motion.motion import CharacterMotion
-from ..numerics.arrays import Array, Indices
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.components import components
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
@@ -95,11 +96,29 @@ class RespondedSkin:
         sole[~of_body(worn.skin, worn.bones, worn.recording)[triangles].all(axis=1)] = NO_SOLE
         self.triangles = {int(number): triangles[sole == number] for number in np.unique(sole)}
 
-    def at(self, samples: Indices) -> Array:
-        """World positions of all vertices at some samples (K,), (K, V, 3) [m]."""
-        count = len(self._worn.skin.vertices)
+    def at(self, samples: Indices, vertices: Indices | None = None) -> Array:
+        """World positions of vertices (V,), or all of them, at some samples (K,), (K, V, 3) [m]."""
+        chosen = np.arange(len(self._worn.skin.vertices)) if vertices is None else vertices
         recording = self._recording.of(samples)
-        return skinned(self._worn.skin, self._worn.bones, recording, np.arange(count)).astype(float)
+        return skinned(self._worn.skin, self._worn.bones, recording, chosen).astype(float)
+
+    def near(self, terrain: Terrain, distance: float) -> Mask:
+        """Vertices (V,) of bones that come within a distance of a terrain [m], and of shapes or no bones."""
+        skin, bones = self._worn.skin, self._worn.bones
+        near = np.ones(len(skin.vertices), dtype=bool)
+        for vertices, _ in skin.weights:
+            near[vertices] = False
+        for name, (vertices, _) in zip(skin.bones, skin.weights, strict=True):
+            rest = skin.vertices[vertices]
+            if not len(rest):
+                continue
+            box = np.stack(np.meshgrid(*zip(rest.min(axis=0), rest.max(axis=0), strict=True), 1.0)).reshape(4, -1)
+            x, y, z, _ = (self._recording.bone(name) @ np.linalg.inv(bones[name].matrix) @ box).swapaxes(0, 1)
+            if not (z.min(axis=-1) >= terrain.heights(x.mean(axis=-1), y.mean(axis=-1)) + distance).all():
+                near[vertices] = True
+        for shape in skin.shapes:
+            near[shape.vertices] = True
+        return near
 
 
 def outsides(points: Array, triangles: Indices) -> Array:

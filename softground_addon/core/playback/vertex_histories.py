@@ -187,7 +187,7 @@ def movements_at(
 
 
 def _moving(footprint: Footprint, reach: Window) -> Mask:
-    """Cells of its reach (rows, columns) near which a footprint moves the ground, within as many cells as it is wider."""
+    """Cells of its reach (rows, columns) near which a footprint moves the ground: within the reach's margin."""
     window = footprint.window
     moving = np.zeros((reach.rows, reach.columns), dtype=bool)
     moves = moving[reach.slices(window)].reshape(-1)

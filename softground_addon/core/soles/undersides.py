@@ -99,7 +99,10 @@ def lowest_surface(
             end = max(begin + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
             block = slice(begin, end)
             _draw(
-                buffer, columns, places[..., block], *((of_column[block], of_row[block]) for of_column, of_row in (first, size))
+                buffer,
+                columns,
+                places[..., block],
+                *((of_column[block], of_row[block]) for of_column, of_row in (first, size)),
             )
             begin = end
     return buffer.reshape(shape)
