@@ -112,7 +112,7 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
     if not isinstance(shot.terrain, MeshTerrain | FlatTerrain):  # slopes, hard and several grounds are not compared
         prints = yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits)
-        return (yield from _checked(wanted, shot, prints))
+        return replace(prints, findings=(yield from _checked(wanted, shot, prints))[1])
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, shot.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
     stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
@@ -128,8 +128,9 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
         prints, grounds=(replace(prints.grounds[0], made_with=wanted),)
     )  # those before may write otherwise
     # What is reported of them is held with them: nothing else has its identity meanwhile.
-    checked = yield from reused(begun, "findings", (id(prints.reported), name), _checked(wanted, shot, prints))
-    return replace(prints, findings=checked.findings)
+    compared = id(prints.reported), name
+    _, findings = yield from reused(begun, "findings", compared, _checked(wanted, shot, prints))
+    return replace(prints, findings=findings)
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
@@ -153,14 +154,16 @@ def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str
     return ShotPrints(tuple(prints), pressed.loads, pressed.responses, reported)
 
 
-def _checked(wanted: BakeSettings, shot: Shot, prints: ShotPrints) -> Job[ShotPrints]:
-    """Prints with what checks say of them and name their grounds."""
+def _checked(
+    wanted: BakeSettings, shot: Shot, prints: ShotPrints
+) -> Job[tuple[Mapping[str, Any], tuple[Finding, ...]]]:
+    """What is reported of prints, and what checks say of them and name their grounds."""
     footprints = [step for each in prints.grounds for step in each.record.footprints]
     names = "', '".join(ground.name for ground in wanted.soft_grounds) or "the ground"
     checking = self_check.slices(prints.loads, footprints, shot.terrain, wanted.cell_size_m, names)
     findings = yield from meanwhile(Progress("simulate", 1.0), checking)
     findings += [finding for each in prints.grounds for finding in _bottomed_out(each)]
-    return replace(prints, findings=tuple(findings))
+    return prints.reported, tuple(findings)
 
 
 def _of_ground(

@@ -149,10 +149,10 @@ def _check_carving(wanted: BakeSettings, loads: Sequence[CharacterLoads], ground
 
     What is too much without carving is refused as such.
     """
-    check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
     try:
         check_cell_size(loads, replace(wanted.fineness, is_carved=True), wanted.longest_bake_s)
     except InputError as error:  # if it is deep
+        check_cell_size(loads, wanted.fineness, wanted.longest_bake_s)
         depths = (yield from pressed_contacts.slices(loads, ground, wanted.cell_size_m)).depths
         if wading(depths.max(initial=0.0), shortest_sole([character.motion for character in loads])) > 0:
             raise InputError(

@@ -51,10 +51,11 @@ class FlatTerrain:
         return np.where(inside, float(self.height), np.nan)
 
 
+@dataclass(frozen=True, eq=False)
 class SlopingTerrain:
     """An endless inclined plane.
 
-    Parameters
+    Attributes
     ----------
     height : float
         Its height at the origin of the world [m].
@@ -62,9 +63,8 @@ class SlopingTerrain:
         Rise along x and y.
     """
 
-    def __init__(self, height: float, slope: Array) -> None:
-        self.height = height
-        self.slope = np.asarray(slope, dtype=np.float64)
+    height: float
+    slope: Array
 
     def heights(self, x: Array, y: Array) -> Array:
         """Heights at world positions [m]."""

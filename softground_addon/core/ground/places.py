@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.arrays import Array, Indices
+from ..numerics.intervals import in_order
 from .sparse_grid import Window
 
 
@@ -24,12 +25,11 @@ class Places:
     def __init__(self, x: Array, y: Array) -> None:
         self.x, self.y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         column, row = np.floor(self.x / self.BIN), np.floor(self.y / self.BIN)
-        self._order = np.lexsort((column, row))
-        bins, self._first = np.unique(
-            np.stack([row[self._order], column[self._order]], axis=-1), axis=0, return_index=True
-        )
-        self._rows, self._columns = bins.T
-        self._first = np.append(self._first, len(self._order))
+        self._order = in_order(row, column)
+        row, column = row[self._order], column[self._order]
+        first = np.flatnonzero((np.diff(row, prepend=np.nan) != 0) | (np.diff(column, prepend=np.nan) != 0))
+        self._rows, self._columns = row[first], column[first]
+        self._first = np.append(first, len(self._order))
 
     def within(self, window: Window, cell_size: float) -> Indices:
         """Places in the cells of a window, (N,), ascending."""

@@ -5,7 +5,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Mask
+from .arrays import Array, Indices, Mask
+
+
+def in_order(place: Array | Indices, time: Array | Indices) -> Indices:
+    """Order by place (N,) and at each place by time (N,); equal ones stay as they are.
+
+    One key is sorted in place of two: where much is in order already, `np.lexsort` takes ten times as long. All times
+    together are to span less than 2^52 times what tells two apart, over the number of places.
+
+    Examples
+    --------
+    >>> in_order(np.array([1, 0, 1, 0]), np.array([2.0, 5.0, -1.0, 5.0])).tolist()
+    [1, 3, 2, 0]
+    """
+    if not len(place):
+        return np.zeros(0, dtype=np.intp)
+    first = time.min()
+    span = 2.0 ** np.ceil(np.log2(time.max() - first + 1.0))
+    return np.argsort(place * span + (time - first), kind="stable")
 
 
 def hysteresis(start: Mask, stop: Mask) -> Mask:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..numerics.arrays import Array, Indices
+from ..numerics.intervals import in_order
 from .ramps import QUANTUM, Ramps
 from .vertex_histories import VertexHistories
 
@@ -68,15 +69,15 @@ def keyframe_tables(over_time: VertexHistories) -> KeyframeTables:
     ramps, contacts = over_time.movement, over_time.contacts
     point = np.concatenate([ramps.point, ramps.point, contacts.point, contacts.point])
     frame = np.concatenate([ramps.start, ramps.end, contacts.start, contacts.end])
-    order = np.lexsort((frame, point))
+    order = in_order(point, frame)
     new = np.ones(len(order), dtype=bool)
     new[1:] = (np.diff(point[order]) != 0) | (np.diff(frame[order]) != 0)
     row = np.empty(len(order), dtype=np.intp)
     row[order] = np.cumsum(new) - 1
     point, frame = point[order][new], frame[order][new]
     begin, end, touch = np.split(row, np.cumsum([len(ramps.point)] * 2 + [len(contacts.point)]))[:3]
-    places, first = np.unique(point, return_index=True)
-    first = np.append(first, len(point))
+    first = np.append(np.flatnonzero(np.diff(point, prepend=-1)), len(point))
+    places = point[first[:-1]]
     contact = _latest(contacts.start, contacts.end, contacts.pressure, touch, first)
     return KeyframeTables(places, first, frame, _curve(ramps, begin, end, frame, first), *contact)
 

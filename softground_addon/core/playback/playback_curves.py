@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..ground.sparse_grid import SparseGrid
 from ..numerics.arrays import Array, Indices
+from ..numerics.intervals import in_order
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
@@ -180,7 +181,7 @@ def playback_curves_at(
 
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
     """Places (K,) in parts that lie together, of which each takes about as much to work out."""
-    order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
+    order = in_order(np.floor(y / PART), np.floor(x / PART))
     contacts = SparseGrid(footprints[0].cell_size if footprints else PART, channels=1)
     for footprint in footprints:
         contacts.write(footprint.window, contacts.read(footprint.window) + 1)
@@ -226,13 +227,13 @@ def curves(over_time: VertexHistories, frame_rate: float, *, is_small: bool = Fa
     table = keyframe_tables(over_time)
     place = np.repeat(np.arange(len(table.point)), np.diff(table.first))
     row, frame = _with_turns(table, place)
-    jump = np.flatnonzero(table.frame == table.contact_start)
-    jump = jump[np.isin(jump, table.first, invert=True)]
+    jumps = table.frame == table.contact_start
+    jumps[table.first[:-1]] = False
+    jump = np.flatnonzero(jumps)
     # A point on either side of each jump: that before belongs to the contact of the row before.
     rows = np.concatenate([jump - 1, row])
     when = np.concatenate([table.frame[jump], frame])
-    after = np.repeat([0, 1], [len(jump), len(row)])
-    order = np.lexsort((after, when, place[rows]))
+    order = in_order(place[rows], when)
     rows, when = rows[order], when[order]
     size = np.bincount(place[rows], minlength=len(table.point))
     last = table.first[1:] - 1
@@ -275,7 +276,7 @@ def _with_turns(table: KeyframeTables, place: Indices) -> tuple[Indices, Array]:
     rows = np.arange(len(place))
     when = np.concatenate([table.frame, *turns])
     source = np.concatenate([rows, contact, contact])
-    order = np.lexsort((np.arange(len(when)) >= len(rows), when, place[source]))
+    order = in_order(place[source], when)
     row = np.maximum.accumulate(np.where(order < len(rows), order, -1))
     # A turn counts while its contact is the latest, and where there is no row already.
     current = (order < len(rows)) | (

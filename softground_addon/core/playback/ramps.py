@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.arrays import Array, Indices
+from ..numerics.intervals import in_order
 from ..numerics.key_reduction import bend_lines
 
 Intervals = TypeVar("Intervals", bound=Any)
@@ -64,7 +65,7 @@ class Ramps:
 def joined(parts: Sequence[Intervals]) -> Intervals:
     """One set of intervals of points from at least one set, by point and time."""
     whole = side_by_side(parts)
-    order = np.lexsort((whole.start, whole.point))
+    order = in_order(whole.point, whole.start)
     return replace(whole, **{field.name: getattr(whole, field.name)[order] for field in fields(whole)})
 
 

@@ -13,6 +13,7 @@ from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, side_by_side
 from ..numerics.arrays import Array
 from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
+from ..numerics.intervals import in_order
 from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
 
@@ -168,7 +169,7 @@ def sample_at(
 ) -> Slices[GroundSample]:
     """The ground at a frame, looked up at places (K,): made part by part, as all of it takes more than its mesh."""
     values = np.empty((5, len(x)))
-    order = np.lexsort((np.floor(x / SQUARE), np.floor(y / SQUARE)))
+    order = in_order(np.floor(y / SQUARE), np.floor(x / SQUARE))
     margin = len(gaussian_kernel(blur_sigma / cell_size)) // 2 + 1  # a look-up reaches a cell further than the blur
     for first in range(0, len(order), PART):
         part = order[first : first + PART]

@@ -241,6 +241,8 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
     in_column = which.copy()
     for shift in range(1, min(far, columns - 1) + 1):
+        if shift * shift >= best.max():
+            break
         for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
             distance = high[:, beside] + shift * shift
             closer = distance < best[:, to]

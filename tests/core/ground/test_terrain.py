@@ -8,7 +8,8 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.ground.terrain import MeshTerrain
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.terrain import MeshTerrain, plane_of
 
 
 def counter_clockwise(vertices, triangles):
@@ -159,3 +160,28 @@ def test_where_surfaces_lie_one_above_the_other_the_values_are_those_of_the_high
         triangles = np.concatenate([t1, t2 + len(v1)][::order])
         terrain = MeshTerrain.from_mesh(np.concatenate([v1, v2 * [0.5, 1, 1]]), triangles, values=values)
         assert np.array_equal(terrain.interpolated(np.array([0.5, 1.5]), np.array([1.0, 1.0])), [[2.0, 1.0]])
+
+
+SQUARE = np.array([(0.0, 0.0, 1.5), (2.0, 0.0, 1.5), (2.0, 1.0, 1.5), (0.0, 1.0, 1.5), (1.0, 0.5, 1.5)])
+FANS = np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+
+
+def test_a_level_rectangle_is_the_plane_that_it_shows():
+    plane = plane_of(SQUARE, FANS)
+    assert plane == FlatTerrain(1.5, (0.0, 0.0), (2.0, 1.0))
+    x, y = np.random.default_rng(0).uniform(-1.0, 3.0, (2, 1000))
+    np.testing.assert_array_equal(plane.heights(x, y), MeshTerrain.from_mesh(SQUARE, FANS).heights(x, y))
+
+
+@pytest.mark.parametrize(
+    ("vertices", "triangles"),
+    [
+        (SQUARE, FANS[:3]),  # a gap
+        (SQUARE, FANS[:, ::-1]),  # turned over
+        (SQUARE, np.concatenate([FANS[:3], FANS[:1]])),  # as large as if it had none
+        (SQUARE + np.array([(0, 0, 0)] * 4 + [(0, 0, 1e-6)]), FANS),
+        (SQUARE @ [[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], FANS),
+    ],
+)
+def test_what_is_no_level_rectangle_is_no_plane(vertices, triangles):
+    assert plane_of(vertices, triangles) is None
