@@ -141,7 +141,8 @@ def test_what_is_picked_up_is_left_shed_or_still_carried_whatever_is_edited(
     report = jobs.run(bake_job.bake(scene, write=False)).report
     marks, steps, shed = taken[-1]
     assert marks is not None
-    assert marks.carried.left_behind > 0
+    (loads,) = analysis.read(scene).loads
+    assert (marks.carried.left_behind > 0) == loads.contacts.hard.any()  # runs on the spot may stay on both
     assert_booked(marks)
     of_report = report["totals"]["carried_kg"]
     assert of_report["left_behind"] == pytest.approx(marks.carried.left_behind, rel=1e-6)
