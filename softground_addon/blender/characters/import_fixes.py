@@ -33,7 +33,7 @@ def has_legs(character: Any) -> bool:
 
 
 def mass_of(character: Any) -> float:
-    """Likely mass of a character by its skin, or by its height where its skin is too large for it [kg]; 0 without one."""
+    """Likely mass by the skin, or by the height where the skin is too large for it [kg]; 0 without a skin."""
     return likely_mass(character.skin_mass, character.size, two_legs=has_legs(character))[0]
 
 

@@ -107,10 +107,9 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     free = [bone for bone in common if rig.is_free(bone) and rig.can_move(bone)]
     keyed = [bone for bone in free if rig.is_shaped(bone) or bone in rig.keyed]
     if not free:
-        raise InputError(
-            f"No bone of '{rig.name}' carries its whole body: choose the bone of the hips in Properties > "
-            "Physics > Body Bones, or switch Tilt and Grounding off."
-        )
+        hips, root = "choose the bone of the hips in Properties > Physics > Body Bones", "add a root bone in Edit Mode"
+        remedy = hips if joints else f"{root}, and parent to it the bones that have no parent"
+        raise InputError(f"No bone of '{rig.name}' carries its whole body: {remedy}.")
     return (keyed or free)[0]
 
 

@@ -10,6 +10,9 @@ from softground_addon.blender.baking import bake_job, bake_report, sink_feet
 from softground_addon.blender.characters.selection import set_up_automatically
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.response.character_keys import controls_of
+from softground_addon.core.errors import InputError
+from softground_addon.core.rig.mapping import RigMapping, SoleSource
 from tests.blender import fingerprints, responders, shots
 from tests.blender.grounds import plane
 
@@ -162,6 +165,19 @@ def test_a_rig_that_takes_no_layer_is_named_in_a_line_and_prints_all_the_same(sc
     assert "'Walker' is linked" in said["message"]
     assert not has_layer(armature)
     assert bake_report.stale_reasons(scene) == ()
+
+
+def test_a_rig_whose_feet_hang_on_no_bone_of_the_body_is_asked_for_a_root_bone(scene):
+    armature = bpy.data.objects.new("Fox", bpy.data.armatures.new("Fox"))
+    scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in ("body", "paw.L", "paw.R"):
+        armature.data.edit_bones.new(name).tail = (0.0, 0.2, 0.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    paws = tuple(SoleSource(name, name[-1], name, "") for name in ("paw.L", "paw.R"))
+    with pytest.raises(InputError, match="'Fox' carries its whole body: add a root bone in Edit Mode"):
+        controls_of(bpy.context.view_layer, armature, RigMapping({}, paws, "settings"))
 
 
 def test_a_scene_that_was_set_up_before_keeps_its_feet(baked):
