@@ -21,18 +21,21 @@ from ..nodes.node_graph import NodeGraph, Number
 from ..nodes.node_modifiers import GroupInput, new_group
 
 GROUP = "SoftGround Give Way"
-MARK = "softground_give_way"
-"""Custom property of the group."""
+MARK, VERSION = "softground_give_way", 2
+"""Custom property of the group and of the table's vertices: the version of how they fit together."""
 
-TILES, FIRST = "softground_tiles", "softground_first"
-"""Of each tile: its first slot, less what the cell at its corner counts for; of each slot, its first pass."""
+TILES, FIRST, SENT_BY = "softground_tiles", "softground_first", "softground_sent_by"
+"""Of each tile: its first slot, less what the cell at its corner counts for; of each slot, its first pass; of each
+pass, the first over its cell that trod on it, which sends off what lies there."""
 ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
     f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
 )
 """Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
 direction; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
 META = "softground_meta"
-"""Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first frame."""
+"""Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first
+frame; of the third: side of a cell, gravity and radius of a sole's parts, in
+Blender units."""
 
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
@@ -52,23 +55,31 @@ INPUTS = (
     GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
     GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
     GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+    GroupInput("Rolls", 0.0, "How far what lies there rolls where the ground is too hard to press it in", (0.0, 10.0)),
 )
+ROLLING = 0.4
+"""Time in which a pebble rolls out [s]."""
+ASIDE = 2 * pi / 3
+"""Angle over which pieces part that are sent off [rad]."""
+BURIED = 0.5
+"""Share of litter that a rim covers as it rises."""
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
 
 def ensure_group() -> Any:
-    """The node group, made on first use."""
-    known = next((group for group in bpy.data.node_groups if is_give_way(group) and not group.library), None)
+    """The node group of this version, made on first use."""
+    known = next((group for group in bpy.data.node_groups if group.get(MARK) == VERSION and not group.library), None)
     if known is not None:
         return known
     graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
+    graph.tree[MARK] = VERSION
     _fill(graph)
     return graph.tree
 
 
 def is_give_way(tree: Any) -> bool:
-    """True of a node group that `ensure_group` made."""
+    """True of a node group that `ensure_group` made, of any version."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
@@ -78,6 +89,8 @@ class _Table:
 
     Attributes
     ----------
+    to_scatter : matrix
+        From cells to the scatter's space.
     cell_up : vector
         Up by one cell, in the scatter's space.
     ways : three vectors
@@ -87,6 +100,7 @@ class _Table:
     """
 
     vertices: Any
+    to_scatter: Any
     cell_up: Any
     ways: list[Any]
     axes: list[Any]
@@ -97,7 +111,11 @@ class _Table:
     columns: Number
     rows: Number
     first_frame: Number
+    cell: Number
+    gravity: Number
+    radius: Number
     stands: Any
+    rolls: Any
     sinks: Any
 
     @property
@@ -145,9 +163,10 @@ def _table(graph: NodeGraph, chosen: Any) -> _Table:
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
-    choices = chosen["Stands"], chosen["Sinks"]
-    space = cell_up, ways, axes, origin.outputs["Vector"]
-    return _Table(vertices, *space, row, tile, frame_rate, columns, rows, first_frame, *choices)
+    cell, gravity, radius = graph.parts(graph.at_index(vertices, numbers, 2))
+    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius
+    space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
+    return _Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
@@ -179,6 +198,8 @@ class _Passes:
         Share of plants that are not worn down; how far they lie, and how much further the others do.
     ground : vector
         Slope and height of the ground [cells].
+    sent : vector
+        Way along the ground of what lies on it, and its height above it [cells].
     """
 
     counted: Any
@@ -188,6 +209,7 @@ class _Passes:
     further: Any
     share: Any
     ground: Any
+    sent: Any
 
 
 def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Passes:
@@ -236,9 +258,29 @@ def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Pa
         leans.append(lean)
         shares.append(share)
     share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
-    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground
+    sent = _sent(graph, table, by, plant.height, frame)
+    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground, sent
     vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
     return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
+
+
+def _sent(graph: NodeGraph, table: _Table, by: Pass, height: Number, frame: Number) -> Any:
+    """Way of litter: rolled along where the ground is too hard to press it in, thrown back by soles that throw debris.
+
+    What rolls is slowed down evenly; what is thrown leaves at 45° with the speed of the sole, v, less what holds it:
+    it comes as far as v²/g - R.
+    """
+    level = graph.parts(graph.attribute(SINK, "FLOAT_VECTOR"))[2]
+    hard = (level * table.cell / height + 1.0).within_one()
+    remains = 1.0 - ((frame - by.start) / (table.frame_rate * ROLLING)).within_one()
+    rolled = graph.number(table.rolls) / table.cell * hard * (1.0 - remains * remains)
+    speed = by.up * table.frame_rate
+    reach = (speed * speed / table.gravity - table.radius).at_least(0.0)
+    flown = ((frame - by.end) / ((reach * 2.0 / table.gravity).root() * table.frame_rate).at_least(1.0)).within_one()
+    is_sent = by.passes.above(0.5)
+    along, rise = ((way * is_sent) for way in (rolled - reach / table.cell * flown, reach / table.cell * flown))
+    upward = graph.combined(0.0, 0.0, (rise * (1.0 - flown)).socket)
+    return graph.vector("MULTIPLY_ADD", graph.attribute(LEAN, "FLOAT_VECTOR"), along.socket, upward)
 
 
 @dataclass(frozen=True)
@@ -276,18 +318,27 @@ def _given_way(
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
+    place = _in_cells(graph, table, root.socket)
+    sent = _sent_off(graph, passes, latest, chance)
+    way_there = zip(place, graph.parts(sent), strict=False)
+    place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
+    there = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
+    there = graph.choose("INT", table.stands, there, latest.socket)
     lean, further, share, ground = (
-        graph.at_index(passes.vertices, value, latest.socket)
+        graph.at_index(passes.vertices, value, there)
         for value in (passes.lean, passes.further, passes.share, passes.ground)
     )
     remain, bent, bent_further = graph.parts(share)
     is_worn = chance.above(remain)
     lean = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean)
-    beside = [part.fraction() - 0.5 for part in _in_cells(graph, table, root.socket)]
+    beside = [part.fraction() - 0.5 for part in place]
     slope_x, slope_y, level = graph.parts(ground)
     height = level + slope_x * beside[0] + slope_y * beside[1]
-    height = graph.choose("FLOAT", table.sinks, 0.0, height.socket)
-    shift = graph.scaled(table.cell_up, height)
+    seen = height.at_most(0.0) + height.at_least(0.0) * chance.above(BURIED)
+    height = graph.choose("FLOAT", table.stands, seen.socket, height.socket)
+    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, 0.0, height))
+    way = _turned(graph, sent, table.to_scatter)
+    shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
     fields = (graph.number(lean), graph.number(shift), bent + bent_further * is_worn)
@@ -296,6 +347,15 @@ def _given_way(
     moved = _Moved(lean, shift, bent, is_touched.socket)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
     return graph.choose("GEOMETRY", touched.socket, geometry, move(changed, moved))
+
+
+def _sent_off(graph: NodeGraph, passes: _Passes, latest: Number, chance: Number) -> Any:
+    """Way of litter by the first sole that trod on it, a part of it and to another side for each piece [cells]."""
+    by = graph.at_index(passes.vertices, graph.attribute(SENT_BY, "INT"), latest.socket, "INT")
+    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), chance.socket)
+    angle = ((chance * 17.0).fraction() - 0.5) * ASIDE
+    inputs = {"Vector": sent, "Angle": angle.socket}
+    return graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]
 
 
 def _in_cells(graph: NodeGraph, table: _Table, root: Any) -> list[Number]:
