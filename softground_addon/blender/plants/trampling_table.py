@@ -88,7 +88,8 @@ def modifier_of(obj: bpy.types.Object) -> Any:
 def _play_anew(modifier: Any) -> None:
     """Have a modifier play the group of this version, with what the artist has set."""
     if modifier.node_group.get(nodes.MARK) != nodes.VERSION:
-        chosen = {name: compat.read_input(modifier, key) for name, key in inputs_of(modifier).items()}
+        known = inputs_of(modifier)
+        chosen = {name: compat.read_input(modifier, known[name]) for name, *_ in nodes.INPUTS if name in known}
         modifier.node_group = nodes.ensure_group()
         set_inputs(modifier, {name: value for name, value in chosen.items() if value is not None})
 
