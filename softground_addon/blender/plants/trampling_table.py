@@ -17,6 +17,7 @@ from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import give_way_nodes as nodes
+from . import trampling_layout as layout
 
 NAME = "SoftGround Tramplings"
 TRAMPLED, TRAMPLED_ON = "softground_trampled", "softground_trampled_on"
@@ -46,7 +47,7 @@ def ensure(ground: bpy.types.Object) -> bpy.types.Object:
 def is_current(ground: bpy.types.Object) -> bool:
     """True if a ground has a table, and what is in it is of this version."""
     table = of(ground)
-    return table is not None and table.data.get(nodes.MARK) == nodes.VERSION
+    return table is not None and table.data.get(layout.MARK) == layout.VERSION
 
 
 def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
@@ -87,7 +88,7 @@ def modifier_of(obj: bpy.types.Object) -> Any:
 
 def _play_anew(modifier: Any) -> None:
     """Have a modifier play the group of this version, with what the artist has set."""
-    if modifier.node_group.get(nodes.MARK) != nodes.VERSION:
+    if modifier.node_group.get(layout.MARK) != layout.VERSION:
         known = inputs_of(modifier)
         chosen = {name: compat.read_input(modifier, known[name]) for name, *_ in nodes.INPUTS if name in known}
         modifier.node_group = nodes.ensure_group()
@@ -114,27 +115,27 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     second = is_second[:-2]
     level = np.zeros(len(active))
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
-        (nodes.META, "FLOAT_VECTOR", np.array(meta)),
-        (nodes.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
-        (nodes.FIRST, "INT", trampled.first),
-        (nodes.SENT_BY, "INT", _first_to_tread(trampled)),
+        (layout.META, "FLOAT_VECTOR", np.array(meta)),
+        (layout.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
+        (layout.FIRST, "INT", trampled.first),
+        (layout.SENT_BY, "INT", _first_to_tread(trampled)),
         *(
             (name, "FLOAT_VECTOR", np.column_stack(parts))
             for name, parts in (
-                (nodes.ACTIVE, (active, following, after)),
-                (nodes.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
-                (nodes.PACE, (by.down * pace, by.up * pace, by.above / scale)),
-                (nodes.LEAN, (trampled.direction, level)),
-                (nodes.SHARES, (by.reach, by.lasting, second)),
-                (nodes.SINK, (trampled.slope, trampled.sink / size)),
+                (layout.ACTIVE, (active, following, after)),
+                (layout.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
+                (layout.PACE, (by.down * pace, by.up * pace, by.above / scale)),
+                (layout.LEAN, (trampled.direction, level)),
+                (layout.SHARES, (by.reach, by.lasting, second)),
+                (layout.SINK, (trampled.slope, trampled.sink / size)),
             )
         ),
     )
-    vertices[nodes.MARK] = nodes.VERSION
+    vertices[layout.MARK] = layout.VERSION
     count = max(len(values) for _, _, values in arrays) + 1
     vertices.vertices.add(count)
     for name, kind, values in arrays:
-        whole = np.full((count, *values.shape[1:]), NEVER if name == nodes.ACTIVE else 0, values.dtype)
+        whole = np.full((count, *values.shape[1:]), NEVER if name == layout.ACTIVE else 0, values.dtype)
         whole[: len(values)] = values
         mesh_arrays.add_attributes(vertices, [(name, kind, whole)])
 
