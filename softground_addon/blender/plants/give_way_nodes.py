@@ -19,7 +19,8 @@ import bpy
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number
 from ..nodes.node_modifiers import GroupInput, new_group
-from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, META, PACE, SENT_BY, SHARES, SINK, TILES, TIMES, VERSION
+from . import litter_nodes
+from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, META, PACE, SHARES, SINK, TILES, TIMES, VERSION
 
 GROUP = "SoftGround Give Way"
 BENT = "softground_bent"
@@ -42,10 +43,6 @@ INPUTS = (
     GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
     GroupInput("Rolls", 0.0, "How far what lies there rolls where the ground is too hard to press it in", (0.0, 10.0)),
 )
-ROLLING = 0.4
-"""Time in which a pebble rolls out [s]."""
-ASIDE = 2 * pi / 3
-"""Angle over which pieces part that are sent off [rad]."""
 BURIED = 0.5
 """Share of litter that a rim covers as it rises."""
 MEANS = 3
@@ -243,29 +240,10 @@ def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Pa
         leans.append(lean)
         shares.append(share)
     share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
-    sent = _sent(graph, table, by, plant.height, frame)
+    sent = litter_nodes.way(graph, table, by, plant.height, frame)
     vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground, sent
     vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
     return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
-
-
-def _sent(graph: NodeGraph, table: _Table, by: Pass, height: Number, frame: Number) -> Any:
-    """Way of litter: rolled along where the ground is too hard to press it in, thrown back by soles that throw debris.
-
-    What rolls is slowed down evenly; what is thrown leaves at 45° with the speed of the sole, v, less what holds it:
-    it comes as far as v²/g - R.
-    """
-    level = graph.parts(graph.attribute(SINK, "FLOAT_VECTOR"))[2]
-    hard = (level * table.cell / height + 1.0).within_one()
-    remains = 1.0 - ((frame - by.start) / (table.frame_rate * ROLLING)).within_one()
-    rolled = graph.number(table.rolls) / table.cell * hard * (1.0 - remains * remains)
-    speed = by.up * table.frame_rate
-    reach = (speed * speed / table.gravity - table.radius).at_least(0.0)
-    flown = ((frame - by.end) / ((reach * 2.0 / table.gravity).root() * table.frame_rate).at_least(1.0)).within_one()
-    is_sent = by.passes.above(0.5)
-    along, rise = ((way * is_sent) for way in (rolled - reach / table.cell * flown, reach / table.cell * flown))
-    upward = graph.combined(0.0, 0.0, (rise * (1.0 - flown)).socket)
-    return graph.vector("MULTIPLY_ADD", graph.attribute(LEAN, "FLOAT_VECTOR"), along.socket, upward)
 
 
 @dataclass(frozen=True)
@@ -304,7 +282,7 @@ def _given_way(
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
     place = _in_cells(graph, table, root.socket)
-    sent = _sent_off(graph, passes, latest, chance)
+    sent = litter_nodes.sent_off(graph, passes, latest, chance)
     way_there = zip(place, graph.parts(sent), strict=False)
     place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
     there = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
@@ -332,15 +310,6 @@ def _given_way(
     moved = _Moved(lean, shift, bent, is_touched.socket)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
     return graph.choose("GEOMETRY", touched.socket, geometry, move(changed, moved))
-
-
-def _sent_off(graph: NodeGraph, passes: _Passes, latest: Number, chance: Number) -> Any:
-    """Way of litter by the first sole that trod on it, a part of it and to another side for each piece [cells]."""
-    by = graph.at_index(passes.vertices, graph.attribute(SENT_BY, "INT"), latest.socket, "INT")
-    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), chance.socket)
-    angle = ((chance * 17.0).fraction() - 0.5) * ASIDE
-    inputs = {"Vector": sent, "Angle": angle.socket}
-    return graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]
 
 
 def _in_cells(graph: NodeGraph, table: _Table, root: Any) -> list[Number]:

@@ -13,7 +13,7 @@ from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes.node_modifiers import inputs_of
-from softground_addon.blender.plants import give_way_nodes, trampling_table
+from softground_addon.blender.plants import give_way_nodes, litter_nodes, trampling_table
 from softground_addon.blender.playback import own_data
 from softground_addon.core.plants.bending import MOST_LASTING, PLANTS
 from softground_addon.core.plants.tramplings import tramplings
@@ -356,7 +356,7 @@ def test_pebbles_roll_along_on_hard_ground_evenly_slowed_down_and_are_pressed_in
     assert 0.4 * rolls < far.mean() < 0.6 * rolls
     along = np.einsum("ni,ni->n", end, table.direction[number]) / far
     assert along.min() > np.cos(np.radians(61.0))
-    frame = table.by.start[number[0]] + 0.5 * give_way_nodes.ROLLING * RATE
+    frame = table.by.start[number[0]] + 0.5 * litter_nodes.ROLLING * RATE
     np.testing.assert_allclose(rolled(frame)[0], 0.75 * end[0], rtol=1e-3, atol=1e-5)
     turned = angles(pebbles)[trodden]
     assert (turned > 30.0).any()
