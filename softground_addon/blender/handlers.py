@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -15,8 +16,9 @@ from .compat import remove_scene
 from .debris import debris_object
 from .ground import baked_ground
 from .live import live
-from .operators import modal_job
+from .operators import give_way, modal_job
 from .panels.outdated import compare_bake
+from .plants import trampling_table
 from .reading import analysis
 from .sampling.sampling_scene import IS_TEMPORARY
 from .viewport import overlay
@@ -143,8 +145,19 @@ def after_load(*_: Any) -> None:
     """An autosave from within a bake may hold its working scene; opening a file ends all subscriptions."""
     _remove_left_over_scenes()
     translation.watch()
+    _renew_tables()
     if not bpy.app.background:
         _later(compare_bake)
+
+
+def _renew_tables() -> None:
+    """Plants that play a table of an earlier version get one of this; those of a damaged record play on as they did."""
+    for scene in bpy.data.scenes:
+        for ground in settings.listed_grounds(scene.softground):
+            if trampling_table.of(ground) and not (ground.library or trampling_table.is_current(ground)):
+                scene.view_layers[0].update()
+                with suppress(InputError):
+                    give_way.renew_table(ground)
 
 
 def _remove_left_over_scenes() -> None:

@@ -54,15 +54,21 @@ class SOFTGROUND_OT_give_way(bpy.types.Operator):
 def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str) -> None:
     """Let objects give way to the prints of a ground."""
     ground_checks.check_writable(ground)
-    if trampling_table.of(ground) is None and baked_ground.is_baked(ground):
-        footprints, about = baked_ground.load(ground)
-        with damage_named(ground):
-            units = baked_ground.units_of(about["inputs"])
-        trampling_table.ensure(ground)
-        trampled_ground.write(ground, tramplings(footprints), units)
+    renew_table(ground)
     table = trampling_table.ensure(ground)
     for obj in chosen:
         give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
+
+
+def renew_table(ground: bpy.types.Object) -> None:
+    """Write the table of a ground from its record, where there is a bake and no table of this version; see `load`."""
+    if trampling_table.is_current(ground) or not baked_ground.is_baked(ground):
+        return
+    footprints, about = baked_ground.load(ground)
+    with damage_named(ground):
+        units = baked_ground.units_of(about["inputs"])
+    trampling_table.ensure(ground)
+    trampled_ground.write(ground, tramplings(footprints), units)
 
 
 def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:

@@ -15,10 +15,12 @@ from . import give_way_nodes as nodes
 from .trampling_table import modifier_of
 
 MODIFIER = nodes.GROUP
-LITTER = "LITTER"
+LITTER = {"LITTER": 0.0, "PEBBLES": 0.12}
+"""Kinds of what lies on the ground, and how far they roll where it is hard [m]."""
 KINDS = (
     *((key, title, f"Plants that bend and rise like {title.lower()}") for key, (title, _) in PLANTS.items()),
-    (LITTER, "Leaves and Pebbles", "What lies on the ground, is pressed in, and tilts with the prints"),
+    ("LITTER", "Leaves and Twigs", "What lies on the ground, is pressed in, tilts with the prints, and is thrown"),
+    ("PEBBLES", "Pebbles", "As leaves and twigs; on hard ground they roll aside"),
 )
 """What gives way, as an enum has it."""
 SCATTERS = ("MESH", "CURVES")
@@ -55,7 +57,8 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
         "Recovery": plant.recovery,
         "Breaks": plant.breaks,
         "Half After": plant.half_after,
-        "Stands": kind != LITTER,
+        "Stands": kind not in LITTER,
+        "Rolls": LITTER.get(kind, 0.0),
         "Sinks": not follows,
         "Loose Parts": obj.type == "MESH" and obj not in grounds and not len(instances),
     }

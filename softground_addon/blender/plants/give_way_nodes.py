@@ -19,21 +19,10 @@ import bpy
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number
 from ..nodes.node_modifiers import GroupInput, new_group
+from . import litter_nodes
+from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, META, PACE, SHARES, SINK, TILES, TIMES, VERSION
 
 GROUP = "SoftGround Give Way"
-MARK = "softground_give_way"
-"""Custom property of the group."""
-
-TILES, FIRST = "softground_tiles", "softground_first"
-"""Of each tile: its first slot, less what the cell at its corner counts for; of each slot, its first pass."""
-ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
-    f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
-)
-"""Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
-direction; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
-META = "softground_meta"
-"""Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first frame."""
-
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
 _ROOT, _PART, _LOW = (f".softground_{name}" for name in ("root", "part", "low"))
@@ -52,23 +41,27 @@ INPUTS = (
     GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
     GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
     GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+    GroupInput("Rolls", 0.0, "How far what lies there rolls where the ground is too hard to press it in", (0.0, 10.0)),
 )
+BURIED = 0.5
+"""Share of litter that a rim covers as it rises."""
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
 
 def ensure_group() -> Any:
-    """The node group, made on first use."""
-    known = next((group for group in bpy.data.node_groups if is_give_way(group) and not group.library), None)
+    """The node group of this version, made on first use."""
+    known = next((group for group in bpy.data.node_groups if group.get(MARK) == VERSION and not group.library), None)
     if known is not None:
         return known
     graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
+    graph.tree[MARK] = VERSION
     _fill(graph)
     return graph.tree
 
 
 def is_give_way(tree: Any) -> bool:
-    """True of a node group that `ensure_group` made."""
+    """True of a node group that `ensure_group` made, of any version."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
@@ -78,6 +71,8 @@ class _Table:
 
     Attributes
     ----------
+    to_scatter : matrix
+        From cells to the scatter's space.
     cell_up : vector
         Up by one cell, in the scatter's space.
     ways : three vectors
@@ -87,6 +82,7 @@ class _Table:
     """
 
     vertices: Any
+    to_scatter: Any
     cell_up: Any
     ways: list[Any]
     axes: list[Any]
@@ -97,7 +93,11 @@ class _Table:
     columns: Number
     rows: Number
     first_frame: Number
+    cell: Number
+    gravity: Number
+    radius: Number
     stands: Any
+    rolls: Any
     sinks: Any
 
     @property
@@ -145,9 +145,10 @@ def _table(graph: NodeGraph, chosen: Any) -> _Table:
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
-    choices = chosen["Stands"], chosen["Sinks"]
-    space = cell_up, ways, axes, origin.outputs["Vector"]
-    return _Table(vertices, *space, row, tile, frame_rate, columns, rows, first_frame, *choices)
+    cell, gravity, radius = graph.parts(graph.at_index(vertices, numbers, 2))
+    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius
+    space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
+    return _Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
 
 
 def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
@@ -179,6 +180,8 @@ class _Passes:
         Share of plants that are not worn down; how far they lie, and how much further the others do.
     ground : vector
         Slope and height of the ground [cells].
+    sent : vector
+        Way along the ground of what lies on it, and its height above it [cells].
     """
 
     counted: Any
@@ -188,6 +191,7 @@ class _Passes:
     further: Any
     share: Any
     ground: Any
+    sent: Any
 
 
 def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Passes:
@@ -236,7 +240,8 @@ def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Pa
         leans.append(lean)
         shares.append(share)
     share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
-    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground
+    sent = litter_nodes.way(graph, table, by, plant.height, frame)
+    vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground, sent
     vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
     return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
 
@@ -276,18 +281,27 @@ def _given_way(
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
+    place = _in_cells(graph, table, root.socket)
+    sent = litter_nodes.sent_off(graph, passes, latest, chance)
+    way_there = zip(place, graph.parts(sent), strict=False)
+    place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
+    there = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
+    there = graph.choose("INT", table.stands, there, latest.socket)
     lean, further, share, ground = (
-        graph.at_index(passes.vertices, value, latest.socket)
+        graph.at_index(passes.vertices, value, there)
         for value in (passes.lean, passes.further, passes.share, passes.ground)
     )
     remain, bent, bent_further = graph.parts(share)
     is_worn = chance.above(remain)
     lean = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean)
-    beside = [part.fraction() - 0.5 for part in _in_cells(graph, table, root.socket)]
+    beside = [part.fraction() - 0.5 for part in place]
     slope_x, slope_y, level = graph.parts(ground)
     height = level + slope_x * beside[0] + slope_y * beside[1]
-    height = graph.choose("FLOAT", table.sinks, 0.0, height.socket)
-    shift = graph.scaled(table.cell_up, height)
+    seen = height.at_most(0.0) + height.at_least(0.0) * chance.above(BURIED)
+    height = graph.choose("FLOAT", table.stands, seen.socket, height.socket)
+    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, 0.0, height))
+    way = _turned(graph, sent, table.to_scatter)
+    shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
     fields = (graph.number(lean), graph.number(shift), bent + bent_further * is_worn)

@@ -9,19 +9,23 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...core.ground.material import STANDARD_GRAVITY
 from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
 from .. import compat, mesh_arrays
 from ..drafts import none_left_if_it_fails
-from ..nodes.node_modifiers import modifier_with
+from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import give_way_nodes as nodes
+from . import trampling_layout as layout
 
 NAME = "SoftGround Tramplings"
 TRAMPLED, TRAMPLED_ON = "softground_trampled", "softground_trampled_on"
 """Properties of the ground, its table, and of the table, its ground."""
 NEVER = 1e9
 """Frame of passes that never begin."""
+THROWN_FROM = 0.05
+"""Radius of the parts of a sole, which throw litter from the speed on from which they throw debris [m]."""
 
 
 def of(ground: bpy.types.Object) -> bpy.types.Object | None:
@@ -40,13 +44,22 @@ def ensure(ground: bpy.types.Object) -> bpy.types.Object:
     return table
 
 
+def is_current(ground: bpy.types.Object) -> bool:
+    """True if a ground has a table, and what is in it is of this version."""
+    table = of(ground)
+    return table is not None and table.data.get(layout.MARK) == layout.VERSION
+
+
 def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
-    """Write what soles trample to a ground's table."""
+    """Write what soles trample to a ground's table, for plants that all play it by the group of this version."""
     with none_left_if_it_fails():
         vertices = bpy.data.meshes.new(NAME)
         if trampled is not None:
             _fill(vertices, trampled, units)
     _exchange(table, vertices)
+    for obj in bpy.data.objects:
+        if obj.library is None and table in _tables_of(obj):
+            _play_anew(modifier_of(obj))
     if trampled is not None:
         side = trampled.cell_size / units.unit_scale_m
         origin = trampled.origin / units.unit_scale_m
@@ -73,6 +86,15 @@ def modifier_of(obj: bpy.types.Object) -> Any:
     return modifier_with(obj, nodes.is_give_way)
 
 
+def _play_anew(modifier: Any) -> None:
+    """Have a modifier play the group of this version, with what the artist has set."""
+    if modifier.node_group.get(layout.MARK) != layout.VERSION:
+        known = inputs_of(modifier)
+        chosen = {name: compat.read_input(modifier, known[name]) for name, *_ in nodes.INPUTS if name in known}
+        modifier.node_group = nodes.ensure_group()
+        set_inputs(modifier, {name: value for name, value in chosen.items() if value is not None})
+
+
 def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> None:
     """Store the table in the attributes of vertices, each from the first on; lengths in cells."""
     stretch, scale, by = units.time_stretch, units.unit_scale_m, trampled.by
@@ -84,6 +106,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     meta = (
         (columns, side, units.frame_rate * stretch),
         (columns * side - 1, rows * side - 1, active.min()),
+        (size / scale, STANDARD_GRAVITY / scale, THROWN_FROM / scale),
     )
     is_second = np.ones(len(active) + 2, bool)
     is_second[trampled.first] = is_second[-2:] = False
@@ -92,27 +115,38 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     second = is_second[:-2]
     level = np.zeros(len(active))
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
-        (nodes.META, "FLOAT_VECTOR", np.array(meta)),
-        (nodes.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
-        (nodes.FIRST, "INT", trampled.first),
+        (layout.META, "FLOAT_VECTOR", np.array(meta)),
+        (layout.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
+        (layout.FIRST, "INT", trampled.first),
+        (layout.SENT_BY, "INT", _first_to_tread(trampled)),
         *(
             (name, "FLOAT_VECTOR", np.column_stack(parts))
             for name, parts in (
-                (nodes.ACTIVE, (active, following, after)),
-                (nodes.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
-                (nodes.PACE, (by.down * pace, by.up * pace, by.above / scale)),
-                (nodes.LEAN, (trampled.direction, level)),
-                (nodes.SHARES, (by.reach, by.lasting, second)),
-                (nodes.SINK, (trampled.slope, trampled.sink / size)),
+                (layout.ACTIVE, (active, following, after)),
+                (layout.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
+                (layout.PACE, (by.down * pace, by.up * pace, by.above / scale)),
+                (layout.LEAN, (trampled.direction, level)),
+                (layout.SHARES, (by.reach, by.lasting, second)),
+                (layout.SINK, (trampled.slope, trampled.sink / size)),
             )
         ),
     )
+    vertices[layout.MARK] = layout.VERSION
     count = max(len(values) for _, _, values in arrays) + 1
     vertices.vertices.add(count)
     for name, kind, values in arrays:
-        whole = np.full((count, *values.shape[1:]), NEVER if name == nodes.ACTIVE else 0, values.dtype)
+        whole = np.full((count, *values.shape[1:]), NEVER if name == layout.ACTIVE else 0, values.dtype)
         whole[: len(values)] = values
         mesh_arrays.add_attributes(vertices, [(name, kind, whole)])
+
+
+def _first_to_tread(trampled: Tramplings) -> NDArray[np.int64]:
+    """Of each pass, the number of the first over its cell that trod on it; without any, its own."""
+    slot = np.repeat(np.arange(len(trampled.first) - 1), np.diff(trampled.first))
+    number = np.arange(len(slot))
+    earliest = np.full(len(trampled.first) - 1, len(slot))
+    np.minimum.at(earliest, slot[trampled.by.passes > 0], number[trampled.by.passes > 0])
+    return np.where(trampled.by.passes > 0, earliest[slot], number)
 
 
 def _exchange(table: bpy.types.Object, vertices: bpy.types.Mesh) -> None:

@@ -13,7 +13,7 @@ from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes.node_modifiers import inputs_of
-from softground_addon.blender.plants import give_way_nodes, trampling_table
+from softground_addon.blender.plants import give_way_nodes, litter_nodes, trampling_table
 from softground_addon.blender.playback import own_data
 from softground_addon.core.plants.bending import MOST_LASTING, PLANTS
 from softground_addon.core.plants.tramplings import tramplings
@@ -330,6 +330,109 @@ def test_litter_is_pressed_in_and_tilts_on_the_walls_but_does_not_bend(shot):
     np.testing.assert_allclose(sunk[latest < 0], 0.0, atol=1e-6)
 
 
+def trodden_on(place):
+    """Table of the bake, and numbers of pieces at places (N, 3) of which the first sole has trodden on each."""
+    table = tramplings(baked_ground.load(bpy.context.scene.softground.ground)[0])
+    latest = table.latest(*place[:, :2].T)
+    return table, np.flatnonzero((latest >= 0) & (table.by.passes[latest] == 1.0))
+
+
+def test_pebbles_roll_along_on_hard_ground_evenly_slowed_down_and_are_pressed_into_soft_ground(shot):
+    place = roots(1500)
+    pebbles = scattered(place)
+    modifier = give_way(pebbles, kind="PEBBLES")
+    rolls = compat.read_input(modifier, inputs_of(modifier)["Rolls"])
+    set_input(modifier, "Height", 1e4)  # so that the ground is hard
+    table, trodden = trodden_on(place)
+    number = table.latest(*place[trodden, :2].T)
+
+    def rolled(frame):
+        go_to(shot, frame)
+        return (blades(pebbles)[0] - place)[trodden, :2]
+
+    end = rolled(200.0)
+    far = np.linalg.norm(end, axis=1)
+    assert 0.9 * rolls < far.max() < rolls
+    assert 0.4 * rolls < far.mean() < 0.6 * rolls
+    along = np.einsum("ni,ni->n", end, table.direction[number]) / far
+    assert along.min() > np.cos(np.radians(61.0))
+    frame = table.by.start[number[0]] + 0.5 * litter_nodes.ROLLING * RATE
+    np.testing.assert_allclose(rolled(frame)[0], 0.75 * end[0], rtol=1e-3, atol=1e-5)
+    turned = angles(pebbles)[trodden]
+    assert (turned > 30.0).any()
+    untouched = np.flatnonzero(table.latest(*place[:, :2].T) < 0)
+    np.testing.assert_allclose(blades(pebbles)[0][untouched], place[untouched], atol=1e-6)
+    set_input(modifier, "Height", 1e-3)
+    np.testing.assert_allclose(rolled(200.0)[table.sink[number] < -1e-3], 0.0, atol=1e-6)
+
+
+def test_litter_is_thrown_by_soles_that_lift_as_fast_as_they_throw_debris_and_lies_on_the_ground_again(shot):
+    place = roots(1500)
+    leaves = scattered(place)
+    modifier = give_way(leaves, kind="LITTER")
+    vertices = compat.read_input(modifier, inputs_of(modifier)["Table"]).data
+    pace = np.empty(3 * len(vertices.vertices), np.float32)
+    vertices.attributes[give_way_nodes.PACE].data.foreach_get("vector", pace)
+    speed = 3.0
+    pace[1::3] = speed / RATE
+    vertices.attributes[give_way_nodes.PACE].data.foreach_set("vector", pace)
+    vertices.update_tag()
+    table, trodden = trodden_on(place)
+    number = table.latest(*place[trodden, :2].T)
+    reach = speed**2 / 9.81 - trampling_table.THROWN_FROM
+    go_to(shot, 200.0)
+    there = blades(leaves)[0]
+    far = np.linalg.norm((there - place)[trodden, :2], axis=1)
+    assert 0.9 * reach < far.max() < reach
+    back = -np.einsum("ni,ni->n", (there - place)[trodden, :2], table.direction[number]) / far
+    assert back.min() > np.cos(np.radians(61.0))
+    lands = table.latest(*there[trodden, :2].T) < 0
+    np.testing.assert_allclose(there[trodden[lands], 2], 0.0, atol=1e-6)
+    first = trodden[lands][0]
+    leaves_at = table.by.end[number[lands][0]]
+    go_to(shot, leaves_at + 0.5 * np.sqrt(2.0 * reach / 9.81) * RATE)
+    flying = blades(leaves)[0][first] - place[first]
+    way = np.linalg.norm((there - place)[first, :2])
+    np.testing.assert_allclose(flying[:2], 0.5 * (there - place)[first, :2], rtol=1e-3, atol=1e-5)
+    assert flying[2] == pytest.approx(0.25 * way, abs=0.045)  # above the ground there, which prints have changed
+
+
+def test_a_rim_covers_half_of_the_litter_that_it_rises_under(shot):
+    place = roots(3000)
+    leaves = scattered(place)
+    give_way(leaves, kind="LITTER")
+    shot.frame_set(60)
+    table = tramplings(baked_ground.load(shot.softground.ground)[0])
+    latest = table.latest(*place[:, :2].T)
+    steep, sink = np.abs(table.slope[latest]).sum(axis=1) * table.cell_size, table.sink[latest]
+    on_rim = (latest >= 0) & (sink > 0.5 * steep + 1e-4)
+    covered = blades(leaves)[0][on_rim, 2] < 1e-6
+    assert on_rim.sum() > 20
+    assert 0.3 < covered.mean() < 0.7
+
+
+def test_a_table_and_a_group_of_an_earlier_version_are_renewed_as_the_file_opens(shot, tmp_path):
+    grass = hair(roots())
+    modifier = give_way(grass)
+    set_input(modifier, "Height", 0.4)
+    shot.frame_set(48)
+    expected, group, table = angles(grass), modifier.node_group, trampling_table.of(shot.softground.ground)
+    group[give_way_nodes.MARK], group.name = True, "Of before"
+    group.nodes.clear()
+    table.data.clear_geometry()
+    del table.data[give_way_nodes.MARK]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    scene = bpy.context.scene
+    scene.frame_set(48)
+    grass = bpy.data.objects["Grass"]
+    modifier = grass.modifiers[-1]
+    assert modifier.node_group.get(give_way_nodes.MARK) == give_way_nodes.VERSION
+    assert compat.read_input(modifier, inputs_of(modifier)["Height"]) == pytest.approx(0.4)
+    np.testing.assert_allclose(angles(grass), expected, atol=1e-3)
+    assert trampling_table.is_current(scene.softground.ground)
+
+
 def test_vertices_of_the_ground_and_blades_know_of_it_for_materials(shot):
     grass = hair(roots())
     give_way(grass)
@@ -444,6 +547,36 @@ def test_on_a_terrain_with_a_finer_copy_along_the_trail_a_scatter_from_it_gives_
     shot.frame_set(40)
     assert angles(scatter)[0] > 60.0
     assert blades(scatter)[0][0, 2] < -0.015
+
+
+def test_the_scatter_of_a_terrain_gives_way_though_a_finer_copy_along_the_trail_shows_the_prints(shot):
+    bpy.ops.softground.clear_bake()
+    terrain = shot.softground.ground = plane(shot, 6.0, 75)
+    grown_on(terrain)
+    shot.softground.detail = "ALWAYS"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert baked_ground.display_mesh_of(terrain) != terrain
+    shot.frame_set(40)
+
+    def seen():
+        graph = bpy.context.evaluated_depsgraph_get()
+        surface = mesh_arrays.positions(terrain.evaluated_get(graph).data).tobytes()
+        matrices = [
+            np.array(i.matrix_world) for i in graph.object_instances if i.is_instance and i.parent.original == terrain
+        ]
+        return surface, np.array(matrices)
+
+    surface, standing = seen()
+    modifier = give_way(terrain)
+    bent_surface, bent = seen()
+    assert bent_surface == surface
+    assert (np.degrees(np.arccos(np.clip(bent[:, 2, 2], -1.0, 1.0))) > 60.0).sum() > 10
+    assert bent[:, 2, 3].min() < -0.015  # into the prints of the copy
+    terrain.modifiers.remove(modifier)
+    bpy.context.view_layer.update()
+    again_surface, again = seen()
+    assert (again_surface, again.tobytes()) == (surface, standing.tobytes())
+    assert not bake_report.stale_reasons(shot)
 
 
 SKIN, DEEP, SHOE = 0.004, (0.012, 0.023, 1.0), 0.05
