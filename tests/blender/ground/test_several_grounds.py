@@ -1,6 +1,8 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
 import json
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -11,6 +13,7 @@ from softground_addon.blender.baking import bake_job, bake_report, clean_feet, s
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.weather import ground_weather
@@ -563,6 +566,38 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     assert settings.grounds_of(scene.softground)[1:] == [crate]
     assert bake(scene).report["warnings"] == []
+
+
+def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_cleared_or_it_is_listed(crate):
+    scene = bpy.context.scene
+    before, options = fingerprints.of_file(), scene.softground
+    also(crate)
+    bake(scene)
+    prints = bytes_of(prints_on(crate))
+    for take_out in (bpy.ops.softground.remove_ground, options.grounds.clear):
+        assert rows_about(CRATE) == []
+        take_out()
+        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_bake"]
+        assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
+    options.grounds.clear()
+    (note,) = [row for row in bake(scene).report["self_check"] if row["code"] == "unlisted_prints"]
+    assert "'Crate' keeps the prints of an earlier bake" in note["message"]
+    assert bytes_of(prints_on(crate)) == prints
+    assert bpy.ops.softground.clear_bake(object=CRATE) == {"FINISHED"}
+    assert not baked_ground.has_remains(crate)
+    assert baked_ground.is_baked(options.ground)
+    assert rows_about(CRATE) == []
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def rows_about(name):
+    """Operators that the Ground panel offers on an object of a name."""
+    layout, buttons = MagicMock(), []
+    layout.row.return_value = layout
+    layout.operator.side_effect = lambda name, **_: buttons.append((name, button := SimpleNamespace())) or button
+    panels.SOFTGROUND_PT_ground.draw(SimpleNamespace(fields=lambda: layout), bpy.context)
+    return [operator for operator, button in buttons if vars(button).get("object") == name]
 
 
 @pytest.mark.parametrize("is_purged", [True, False])
