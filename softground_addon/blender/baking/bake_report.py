@@ -29,6 +29,12 @@ LAST_FRAME = "last_frame"
 """Entry of a bake's summary: the frame at which its last contact ends."""
 
 
+def baked_grounds(options: Any) -> list[bpy.types.Object]:
+    """Grounds of a scene with a bake; the first, where none has any."""
+    grounds = settings.grounds_of(options)
+    return [ground for ground in grounds if baked_ground.is_baked(ground)] or grounds[:1]
+
+
 def note_prints(options: Any) -> None:
     """Note the grounds of a scene that have prints, so that they are known once they leave the list."""
     known = [*(item.object for item in options.printed), *settings.listed_grounds(options)]

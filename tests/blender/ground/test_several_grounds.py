@@ -8,16 +8,19 @@ import bpy
 import numpy as np
 import pytest
 
+from sample_scenes import stage
 from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.output import event_points, export_formats, sound_exports
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.weather import ground_weather
 from softground_addon.core.errors import InputError
+from softground_addon.core.events import sound
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
@@ -589,6 +592,29 @@ def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_c
     assert rows_about(CRATE) == []
     bpy.ops.softground.clear_bake()
     assert fingerprints.of_file() == before
+
+
+def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_it_is_one(crate, tmp_path, monkeypatch):
+    scene = bpy.context.scene
+    also(crate)
+    report = bake(scene).report
+    events, heard, told = tmp_path / "events.jsonl", [], []
+    bpy.ops.softground.export(filepath=str(events), format="EVENTS_JSON")
+    rows = [json.loads(line) for line in events.read_text().splitlines()]
+    rows = [row for row in rows if "step" in row]
+    assert [(row["step"], row["phase"]) for row in rows] == [(row["step"], row["phase"]) for row in report["events"]]
+    bpy.ops.softground.event_markers()
+    assert len(scene.timeline_markers) == sum(row["phase"] in event_points.MARKED for row in rows)
+    monkeypatch.setattr(sound, "footsteps", lambda steps, *_: heard.extend(steps) or np.zeros((9, 1)))
+    stage.add_camera(scene, "Ear", 50.0)
+    scene.camera = bpy.data.objects["Ear"]
+    for stereo in (False, True):
+        heard.clear()
+        sound_exports.write(scene, tmp_path / "steps.wav", 1, 84, stereo=stereo)
+        assert sorted(step.name for step in heard) == sorted(row["id"] for row in report["steps"])
+    monkeypatch.setattr(export_formats, "translated", lambda text, **_: told.append(text) or text)
+    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2")
+    assert told == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
 
 
 def rows_about(name):
