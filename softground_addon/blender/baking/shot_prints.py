@@ -17,7 +17,7 @@ from ...core.debris.debris import Debris
 from ...core.events.events import Event, as_edited, events, in_order
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.hard_ground import HardOnSoft, SeveralGrounds
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.estimate import CharacterLoads, follows_landings
@@ -108,17 +108,21 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
-    if not isinstance(shot.terrain, MeshTerrain):  # what is made or hard is not compared, nor are several grounds
+    if not isinstance(shot.terrain, MeshTerrain | HardOnSoft | SeveralGrounds):  # what is made is not compared
         return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, shot.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
     stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
-    painted = shot.variation, shot.regions(wanted)  # the rest of the ground the settings have
+    of_each = list(zip(wanted.of_each_ground, shot.of_each_ground, strict=True))
+    painted = [
+        (part.variation, part.regions(each)) for each, part in of_each
+    ]  # the rest of the ground the settings have
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, edits)
     prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing)
-    return replace(prints, grounds=(replace(prints.grounds[0], made_with=wanted),))  # those before may write otherwise
+    grounds = zip(prints.grounds, wanted.of_each_ground, strict=True)  # those before may write otherwise
+    return replace(prints, grounds=tuple(replace(before, made_with=each) for before, each in grounds))
 
 
 def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:

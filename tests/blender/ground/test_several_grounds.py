@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sample_scenes import stage
-from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, settings
+from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, reuse, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
@@ -18,6 +18,7 @@ from softground_addon.blender.output import event_points, export_formats, sound_
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
 from softground_addon.blender.weather import ground_weather
 from softground_addon.core.errors import InputError
 from softground_addon.core.events import sound
@@ -615,6 +616,37 @@ def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_i
     monkeypatch.setattr(export_formats, "translated", lambda text, **_: told.append(text) or text)
     bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2")
     assert told == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
+
+
+def test_a_bake_again_takes_the_prints_of_all_grounds_over_until_something_acts_on_them(crate):
+    scene = bpy.context.scene
+    item, options = also(crate), scene.softground
+    options.hard_grounds.add().object = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+
+    def presses(change):
+        before = state.results["prints", ""][1]
+        change()
+        bake(scene)
+        return state.results["prints", ""][1] is not before
+
+    def soften():
+        further_grounds.own_material(options, item).youngs_modulus *= 0.5
+
+    def shift():
+        crate.location.y += 0.02
+        bpy.context.view_layer.update()
+
+    bake(scene)
+    prints = [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)]
+    assert not presses(lambda: setattr(options, "relief_strength", 0.5))
+    assert [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)] == prints
+    for change in (soften, shift, lambda: further_grounds.choose(options, item)):
+        assert presses(change)
+        as_it_comes = [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)]
+        reuse.forget()
+        bake(scene)
+        assert [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)] == as_it_comes
 
 
 def rows_about(name):
