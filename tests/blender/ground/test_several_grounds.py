@@ -23,6 +23,7 @@ from softground_addon.blender.weather import ground_weather
 from softground_addon.core.errors import InputError
 from softground_addon.core.events import sound
 from softground_addon.core.record.edits import StepEdit
+from softground_addon.core.record.typical_depth import typical_of
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
 from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, curves_of, lift
@@ -198,6 +199,24 @@ def test_the_depth_is_predicted_on_all_of_them(crate):
     analysis.read(scene)
     predicted = analysis.expected_depth(scene)
     assert predicted == pytest.approx(bake(scene).report["totals"]["typical_depth_m"], rel=0.05)
+
+
+def test_the_depth_is_predicted_on_the_ground_that_is_shown_in_what_that_is_made_of(crate):
+    scene, options = bpy.context.scene, bpy.context.scene.softground
+    item, slab = also(crate), box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("soft_mud"))
+    bpy.context.view_layer.update()
+    bake(scene)
+    typical = {ground: typical_of(prints_on(ground)) for ground in settings.grounds_of(options)}
+    for _ in typical:
+        analysis.read(scene)
+        predicted = analysis.expected_depth(scene)
+        assert predicted == pytest.approx(typical[options.ground], rel=0.05)
+        further_grounds.choose(options, item)
+    assert max(typical.values()) > 1.5 * min(typical.values())
+    further_grounds.choose(options, also(slab))
+    analysis.read(scene)
+    assert analysis.expected_depth(scene) > 0, "where nobody walks on it, all contacts tell"
 
 
 def test_undo_gives_all_grounds_back_by_bytes(crate):
