@@ -17,7 +17,7 @@ from ...core.debris.debris import Debris
 from ...core.events.events import Event, as_edited, events, in_order
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground.hard_ground import HardOnSoft, SeveralGrounds
+from ...core.ground.hard_ground import HardOnSoft, SeveralGrounds, soft_ground
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.loads.estimate import CharacterLoads, follows_landings
@@ -108,7 +108,7 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
-    if not isinstance(shot.terrain, MeshTerrain | HardOnSoft | SeveralGrounds):  # what is made is not compared
+    if not isinstance(soft_ground(shot.terrain), MeshTerrain | SeveralGrounds):  # what is made is not compared
         return (yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits))
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, shot.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
