@@ -88,12 +88,14 @@ def matrix_in(frame: GroundFrame, obj: bpy.types.Object) -> Array:
     return np.asarray(np.array(frame.matrix) @ world_matrix(obj))
 
 
-def in_scene(points: Array, scene: bpy.types.Scene, frame: GroundFrame | None) -> Array:
-    """Points (..., 3) of a bake [m] where they are in its scene [Blender units]."""
+def in_scene(
+    points: Array, scene: bpy.types.Scene, frame: GroundFrame | None, ground: bpy.types.Object | None = None
+) -> Array:
+    """Points (..., 3) of a bake [m] where they are in its scene [Blender units]; on the first ground, or another."""
     units: Array = points / scene.unit_settings.scale_length
     if frame is None:
         return units
-    matrix = np.array(to_world(frame, scene.softground.ground))
+    matrix = np.array(to_world(frame, ground or scene.softground.ground))
     return np.asarray(units @ matrix[:3, :3].T + matrix[:3, 3])
 
 

@@ -74,7 +74,7 @@ def current() -> Any:
 
 def show_bake(progress: float, status: str) -> None:
     """Let the panel say how far the bake is, 0 to 1, and what it is doing; at times the viewport shows its prints."""
-    state.is_baking, state.progress, state.status = True, progress, status
+    state.is_baking, state.progress, state.status, state.live_ended = True, progress, status, ""
     redraw()
     pressing = state.pressing
     if pressing and len(pressing.footprints) > RARER * pressing.announced:

@@ -22,6 +22,8 @@ class State:
         Prints of the bake that goes on in a window.
     picking, under, edits, box
         What the viewport outlines beside the chosen step, while steps are picked and dragged.
+    live_ended : str
+        Reason why live mode has ended by itself.
     jobs : list of ModalJob
         Those that run in a window.
     hooks : dict
@@ -80,6 +82,7 @@ class State:
     edits: Mapping[str, Any] = field(default_factory=dict)
     box: Sequence[tuple[int, int]] = ()
     live: Any = None
+    live_ended: str = ""
     jobs: list[Any] = field(default_factory=list)
     hooks: dict[str, Callable[..., Any]] = field(default_factory=dict)
     analyses: dict[int, Any] = field(default_factory=dict)

@@ -168,6 +168,8 @@ def bake(
     for each, made_with, moved in zip(published, asked.of_each_ground, movers, strict=False):
         if each:
             sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])
+    if published:
+        bake_report.note_prints(scene.softground)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.footprint or step.baked for step in steps if not step.is_copy))
 
@@ -234,6 +236,7 @@ def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[t
         *bake_report.hidden_skins(scene.objects, wanted, shot.motions),
         *bake_report.shapes_left_out(scene.objects, wanted),
     ]
+    moving += bake_report.unlisted_findings(scene.softground)
     return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
 
 

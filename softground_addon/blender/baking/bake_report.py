@@ -14,7 +14,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.typical_depth import typical_of
 from ...core.settings import BakeSettings
 from .. import settings
-from ..ground import ground_mesh, still_ground
+from ..ground import baked_ground, ground_mesh, still_ground
 from ..jobs import STAGES
 from ..reading import staleness
 from ..sampling.skin_sampling import hidden_on, left_out_on
@@ -27,6 +27,44 @@ TYPICAL = "typical_depth_m"
 """Entry of a bake's summary: how deep its typical step is [m]."""
 LAST_FRAME = "last_frame"
 """Entry of a bake's summary: the frame at which its last contact ends."""
+
+
+def baked_grounds(options: Any) -> list[bpy.types.Object]:
+    """Grounds of a scene with a bake; the first, where none has any."""
+    grounds = settings.grounds_of(options)
+    return [ground for ground in grounds if baked_ground.is_baked(ground)] or grounds[:1]
+
+
+def note_prints(options: Any) -> None:
+    """Note the grounds of a scene that have prints, so that they are known once they leave the list."""
+    known = [*(item.object for item in options.printed), *settings.listed_grounds(options)]
+    options.printed.clear()
+    for ground in dict.fromkeys(filter(settings.exists, known)):
+        if baked_ground.has_remains(ground):
+            options.printed.add().object = ground
+
+
+def unlisted(options: Any) -> list[bpy.types.Object]:
+    """Grounds with prints of bakes of a scene that are not among its grounds any more."""
+    listed, printed = settings.listed_grounds(options), [item.object for item in options.printed]
+    return [
+        ground
+        for ground in printed
+        if ground not in listed and settings.exists(ground) and baked_ground.has_remains(ground)
+    ]
+
+
+def unlisted_findings(options: Any) -> list[Finding]:
+    """Findings about the `unlisted` grounds of a scene."""
+    return [
+        Finding(
+            "unlisted_prints",
+            "note",
+            f"'{ground.name}' keeps the prints of an earlier bake, and is not among the grounds any more.",
+            "Clear them, or list it again, in the Ground panel.",
+        )
+        for ground in unlisted(options)
+    ]
 
 
 def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding]:

@@ -17,7 +17,7 @@ from ...core.debris.debris import Debris
 from ...core.events.events import Event, as_edited, events, in_order
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground.hard_ground import HardOnSoft
+from ...core.ground.hard_ground import HardOnSoft, SeveralGrounds, soft_ground
 from ...core.ground.heightfield import FlatTerrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
@@ -110,25 +110,24 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     """The prints of a shot; errors as of `loads_standing` and `press_shot`."""
     begun, models = Progress("simulate", 0.0), [character.force_model for character in wanted.characters]
     lands, material = any(map(follows_landings, shot.motions, models)), wanted.material
-    if not isinstance(shot.terrain, MeshTerrain | FlatTerrain):  # slopes, hard and several grounds are not compared
+    if not isinstance(soft_ground(shot.terrain), MeshTerrain | FlatTerrain | SeveralGrounds):  # slopes are not compared
         prints = yield from _pressed(wanted, shot, (yield from _stood(wanted, shot)), edits)
         return replace(prints, findings=(yield from _checked(wanted, shot, prints))[1])
     read = yield from meanwhile(begun, report.hash_inputs.slices(shot.motions, shot.terrain))
     source = read, wanted.between(Acts.LOADS, Acts.LOADS), wanted.sinks, material.characteristic_time if lands else None
     stood = yield from reused(begun, "loads", source, _stood(wanted, shot))
     before, after = wanted.between(Acts.READING, Acts.RESPONDING), wanted.between(Acts.OUTPUT, Acts.OUTPUT)
-    name, *_ = (
-        settings.pop(key, None) for settings, key in ((before, "ground"), (after, "camera"), (after, "margin_m"))
-    )
-    painted = shot.variation, shot.regions(wanted)  # the rest of the ground the settings have
+    for settings, key in ((before, "ground"), (after, "camera"), (after, "margin_m")):
+        settings.pop(key, None)
+    of_each = list(zip(wanted.of_each_ground, shot.of_each_ground, strict=True))
+    painted = [(part.variation, part.regions(each)) for each, part in of_each]  # the settings have the rest
     skins = shot.skins if wanted.carves else {}
     pressing = _pressed(wanted, shot, stood, edits)
     prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing)
-    prints = replace(
-        prints, grounds=(replace(prints.grounds[0], made_with=wanted),)
-    )  # those before may write otherwise
+    pairs = zip(prints.grounds, wanted.of_each_ground, strict=True)  # those before may write otherwise
+    prints = replace(prints, grounds=tuple(replace(ground, made_with=each) for ground, each in pairs))
     # What is reported of them is held with them: nothing else has its identity meanwhile.
-    compared = id(prints.reported), name
+    compared = id(prints.reported), [ground.name for ground in wanted.soft_grounds]
     _, findings = yield from reused(begun, "findings", compared, _checked(wanted, shot, prints))
     return replace(prints, findings=findings)
 

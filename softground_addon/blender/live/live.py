@@ -14,7 +14,9 @@ import bpy
 
 from ...core.errors import InputError
 from .. import session, settings
+from ..remedies import said
 from ..state import state
+from ..translation import translated
 from .live_mode import PART, Contact, LiveMode
 
 LOOK = 0.1
@@ -79,8 +81,8 @@ def answer(seconds: float | None = None) -> float | None:
         if state.live.answer(scene, part):
             return PAUSE
         return LOOK if state.live.has_more(scene) else None
-    except InputError:
-        forget()
+    except InputError as error:
+        forget(said(error))
     return None
 
 
@@ -98,16 +100,16 @@ def is_answering() -> bool:
 
 
 def refusal() -> str:
-    """Reason why live mode does not press with the present settings; empty if it does."""
+    """Reason why live mode does not press with the present settings, or why it has ended; empty if it does."""
     scene = _scene()
     if state.live is None or scene is None or not state.live.has_refused:
-        return ""
+        return state.live_ended
     return state.live.refusal(settings.snapshot(scene))
 
 
 def begin(mode: LiveMode) -> None:
     """Follow timeline and settings from now on."""
-    state.live = mode
+    state.live, state.live_ended = mode, ""
     session.current().is_live = True
     bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
     if scene := mode.current_scene():
@@ -115,9 +117,10 @@ def begin(mode: LiveMode) -> None:
     watch()
 
 
-def forget() -> None:
-    """End live mode as it stands, because its scene or its ground went away."""
-    state.live = None
+def forget(reason: str = "") -> None:
+    """End live mode as it stands, because its scene or its ground went away, or for a reason that the panel shows until
+    the next bake."""
+    state.live, state.live_ended = None, translated("Live mode has ended: {reason}", reason=reason) if reason else ""
     if bpy.app.timers.is_registered(answer):
         bpy.app.timers.unregister(answer)
     session.current().is_live = False

@@ -279,6 +279,7 @@ class LiveMode:
         baked, debris = yield from jobs.meanwhile(now, throwing)
         published = yield from publish(baked, debris, place, made_with)
         sign(published, made_with, movers, summary=bake_report.summary_of_prints(baked.footprints))
+        bake_report.note_prints(scene.softground)
 
     def discard(self) -> None:
         """Leave the ground as it was before."""

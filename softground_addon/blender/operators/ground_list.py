@@ -1,15 +1,18 @@
-"""Operators on the list of soft grounds beside the first."""
+"""Operators on the list of soft grounds beside the first, and on the prints of all of them."""
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ...core.errors import InputError
-from .. import further_grounds, settings
-from ..ground import ground_checks, trail_detail
+from .. import further_grounds, reuse, session, settings
+from ..animation_layer.constraint_layer import LayerKind
+from ..baking import bake_report
+from ..ground import baked_ground, ground_checks, look, trail_detail
 from ..operator_base import OnGround, reports_errors
 from ..reading import analysis
+from ..response import response_job
 from ..translation import translated
 from .panel_base import OnMeshes, RemovesChosen, chosen_of
 
@@ -46,6 +49,14 @@ class SOFTGROUND_OT_remove_ground(RemovesChosen):
     bl_label = "Remove Ground"
     of_list = ("grounds", "active_ground")
 
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        options = settings.options_of(context)
+        ground, done = chosen_of(options, *self.of_list).object, super().execute(context)
+        if ground in bake_report.unlisted(options):
+            text = "'{name}' keeps its prints: clear them, or list it again, in the Ground panel"
+            self.report({"WARNING"}, translated(text, name=ground.name))
+        return done
+
 
 class SOFTGROUND_OT_choose_ground(bpy.types.Operator):
     """Show this ground in the panels: its preset, steps, weather and warnings. The one shown before takes its place"""
@@ -70,4 +81,64 @@ class SOFTGROUND_OT_choose_ground(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SOFTGROUND_OT_add_ground, SOFTGROUND_OT_remove_ground, SOFTGROUND_OT_choose_ground)
+class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
+    """Remove the footprints from the ground and the response from the characters, as if there had been no bake"""
+
+    bl_idname = "softground.clear_bake"
+    bl_label = "Clear Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    object: StringProperty(
+        name="Ground",
+        description="Name of a ground that has prints and is not in the list any more; all that are in it if empty",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    only_shown: BoolProperty(
+        name="Only the Ground Shown",
+        description="Of several grounds, leave the others and the response as they are",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = settings.scene_of(context)
+        grounds = [*settings.listed_grounds(scene.softground), *bake_report.unlisted(scene.softground)]
+        if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
+            cls.poll_message_set(translated("There is no bake on the ground"))
+            return False
+        if session.current().is_live:
+            cls.poll_message_set(translated("Live mode is on: press Keep or Discard first"))
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        grounds = settings.listed_grounds(scene.softground)
+        cleared = grounds[:1] if self.only_shown else grounds
+        if self.object:
+            cleared = [obj for obj in bake_report.unlisted(scene.softground) if obj.name == self.object]
+        for ground in filter(baked_ground.has_remains, cleared):  # all of them, or none
+            baked_ground.check_writable(ground)
+        reuse.forget()
+        with analysis.own_changes(scene):
+            for ground in cleared:
+                if baked_ground.has_remains(ground):
+                    baked_ground.clear(ground)
+                look.take_off(ground)
+            bake_report.note_prints(scene.softground)
+            if self.object or (self.only_shown and grounds[1:]):
+                return {"FINISHED"}
+            response_job.remove_layers(scene, LayerKind.RESPONSE)
+        response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
+        if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on
+            scene.softground.grounding.use = scene.softground.grounding.by_button = False
+        return {"FINISHED"}
+
+
+CLASSES = (
+    SOFTGROUND_OT_add_ground,
+    SOFTGROUND_OT_remove_ground,
+    SOFTGROUND_OT_choose_ground,
+    SOFTGROUND_OT_clear_bake,
+)

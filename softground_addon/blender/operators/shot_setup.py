@@ -16,15 +16,13 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import further_grounds, ground_presets, jobs, reuse, session, settings
-from ..animation_layer.constraint_layer import LayerKind
+from .. import further_grounds, ground_presets, jobs, settings
 from ..baking.scene_findings import shape_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
 from ..operator_base import OnGround, reports_errors
 from ..reading import analysis, shots
-from ..response import response_job
 from ..rigs import frame_ranges
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..sampling.body_sampling import deforms
@@ -293,53 +291,6 @@ def _show_physics_of(name: str) -> None:
         show_physics(screen.areas)
 
 
-class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
-    """Remove the footprints from the ground and the response from the characters, as if there had been no bake"""
-
-    bl_idname = "softground.clear_bake"
-    bl_label = "Clear Bake"
-    bl_options = {"REGISTER", "UNDO"}
-
-    only_shown: BoolProperty(
-        name="Only the Ground Shown",
-        description="Of several grounds, leave the others and the response as they are",
-        options={"SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        scene = settings.scene_of(context)
-        grounds = settings.listed_grounds(scene.softground)
-        if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
-            cls.poll_message_set(translated("There is no bake on the ground"))
-            return False
-        if session.current().is_live:
-            cls.poll_message_set(translated("Live mode is on: press Keep or Discard first"))
-            return False
-        return True
-
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        grounds = settings.listed_grounds(scene.softground)
-        cleared = grounds[:1] if self.only_shown else grounds
-        for ground in filter(baked_ground.has_remains, cleared):  # all of them, or none
-            baked_ground.check_writable(ground)
-        reuse.forget()
-        with analysis.own_changes(scene):
-            for ground in cleared:
-                if baked_ground.has_remains(ground):
-                    baked_ground.clear(ground)
-                look.take_off(ground)
-            if self.only_shown and grounds[1:]:
-                return {"FINISHED"}
-            response_job.remove_layers(scene, LayerKind.RESPONSE)
-        response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
-        if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on
-            scene.softground.grounding.use = scene.softground.grounding.by_button = False
-        return {"FINISHED"}
-
-
 class SOFTGROUND_OT_apply_look(OnGround, bpy.types.Operator):
     """Show the preset's look in the prints, over copies of your own materials. Clear Bake removes it"""
 
@@ -410,7 +361,6 @@ CLASSES = (
     SOFTGROUND_OT_use_as_ground,
     SOFTGROUND_OT_create_ground,
     SOFTGROUND_OT_open_settings,
-    SOFTGROUND_OT_clear_bake,
     SOFTGROUND_OT_apply_look,
     SOFTGROUND_OT_copy_bake_command,
 )

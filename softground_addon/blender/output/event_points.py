@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...core.events.events import Event, label
+from ...core.events.events import Event, in_order, label
 from ...core.events.phases import KINDS
 from .. import mesh_arrays, settings
+from ..baking.bake_report import baked_grounds
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
 from ..translation import translated
@@ -75,8 +76,9 @@ def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
     return shown
 
 
-def _events(context: bpy.types.Context) -> list[Event]:
-    return baked_ground.events_of(settings.options_of(context).ground)
+def events_on(grounds: Iterable[bpy.types.Object]) -> list[Event]:
+    """Events of the bakes on some grounds, in the order of time; errors as of `baked_ground.events_of`."""
+    return in_order(row for ground in grounds for row in baked_ground.events_of(ground))
 
 
 class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
@@ -88,7 +90,7 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = _events(context)
+        table = events_on(baked_grounds(settings.options_of(context)))
         shown = add_points(settings.scene_of(context), table)
         self.report(
             {"INFO"}, translated("{count} events are the points of '{name}'", count=len(table), name=shown.name)
@@ -113,7 +115,8 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        count = add_markers(settings.scene_of(context).timeline_markers, _events(context), set(self.phases))
+        table = events_on(baked_grounds(settings.options_of(context)))
+        count = add_markers(settings.scene_of(context).timeline_markers, table, set(self.phases))
         self.report({"INFO"}, translated("Marked {count} events", count=count))
         return {"FINISHED"}
 

@@ -18,11 +18,10 @@ from ...core.events.events import between
 from ...core.files import files
 from .. import settings
 from ..baking import bake_report
-from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
 from ..reading import analysis
 from ..translation import translated
-from . import exports, image_exports, opensim_exports, sound_exports
+from . import event_points, exports, image_exports, opensim_exports, sound_exports
 
 LARGEST_IMAGE = 16384
 """Most pixels along the sides of an image."""
@@ -100,9 +99,10 @@ def _still(ground: bpy.types.Object, options: Options) -> list[Path]:
 def _events(dump: Callable[..., str | bytes], *, is_timed: bool = True) -> Writer:
     """A writer of the events of some frames, their times counted from the first; `is_timed` needs the frame rate."""
 
-    def writer(ground: bpy.types.Object, options: Options) -> list[Path]:
-        rate = settings.frame_rate_of(settings.scene_of(bpy.context))
-        table = between(baked_ground.events_of(ground), options.start, options.end, rate)
+    def writer(_ground: bpy.types.Object, options: Options) -> list[Path]:
+        scene = settings.scene_of(bpy.context)
+        rate, grounds = settings.frame_rate_of(scene), bake_report.baked_grounds(scene.softground)
+        table = between(event_points.events_on(grounds), options.start, options.end, rate)
         content = dump(table, frame_rate=rate) if is_timed else dump(table)
         with files.replacing(options.path) as partial:
             partial.write_bytes(content.encode() if isinstance(content, str) else content)
@@ -116,9 +116,9 @@ def _opensim(_ground: bpy.types.Object, options: Options) -> list[Path]:
     return opensim_exports.write(loads, options.path, options.start, options.end)
 
 
-def _sound(ground: bpy.types.Object, options: Options) -> list[Path]:
+def _sound(_ground: bpy.types.Object, options: Options) -> list[Path]:
     scene, frames = settings.scene_of(bpy.context), (options.start, options.end)
-    sound_exports.write(scene, ground, options.path, *frames, samples=options.samples, stereo=options.stereo)
+    sound_exports.write(scene, options.path, *frames, samples=options.samples, stereo=options.stereo)
     return [options.path]
 
 
@@ -143,6 +143,11 @@ class Format:
     description: str
     write: Writer
     built: bool = True
+
+    @property
+    def of_ground(self) -> bool:
+        """True if it shows a ground, and not what happens on all of them."""
+        return self.suffix in (".abc", ".usdc", ".pc2", ".exr", ".obj")
 
     @property
     def missing(self) -> str:
@@ -368,7 +373,10 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         written = export(
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
         )
-        if len(written) == 1:
+        if FORMATS[self.format].of_ground and len(bake_report.baked_grounds(options)) > 1:
+            text = "Wrote ground '{name}' alone: show another one in the Ground panel to write that too"
+            text = translated(text, name=options.ground.name)
+        elif len(written) == 1:
             text = translated("Wrote {path}", path=written[0])
         else:
             text = translated("Wrote {count} files to {folder}", count=len(written), folder=path.parent)

@@ -95,7 +95,6 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
             raise InputError(f"There is a '{path.name}' already: tick Replace File, or move that file.")
         sound_exports.write(
             scene,
-            options.ground,
             path,
             options.frame_start,
             options.frame_end,

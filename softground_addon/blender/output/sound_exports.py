@@ -15,13 +15,13 @@ from ...core.events import sound, wave_file
 from ...core.events.sound import SoundStep
 from ...core.files import files
 from .. import settings
-from ..ground import baked_ground
+from ..baking import bake_report
+from ..ground import baked_ground, baked_steps
 from ..placement import in_scene
 
 
 def write(
     scene: bpy.types.Scene,
-    ground: bpy.types.Object,
     path: Path,
     start: int,
     end: int,
@@ -29,7 +29,7 @@ def write(
     samples: Path | None = None,
     stereo: bool = False,
 ) -> None:
-    """Write the sound of some frames, which begins with the first of them.
+    """Write the sound of some frames, which begins with the first of them, of the steps on all grounds of a scene.
 
     Parameters
     ----------
@@ -47,15 +47,19 @@ def write(
         camera, or the file cannot be written.
     """
     rate = settings.frame_rate_of(scene)
-    table = baked_ground.events_of(ground)
-    footprints = {step.name: step.footprint for step in baked_ground.steps_of(ground) if step.footprint}
+    grounds = bake_report.baked_grounds(scene.softground)
+    steps = [(step, ground) for ground in grounds for step in _steps_on(ground, rate, start)]
     recordings = _recordings(samples, path) if samples else []
-    steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
-    if stereo:
-        steps = _seen_by_camera(scene, steps)
-    heard = sound.footsteps(steps, (end - start + 1) / rate, recordings)
+    heard_steps = _seen_by_camera(scene, steps) if stereo else [step for step, _ in steps]
+    heard = sound.footsteps(heard_steps, (end - start + 1) / rate, recordings)
     with files.replacing(path) as partial:
         partial.write_bytes(wave_file.dump(heard))
+
+
+def _steps_on(ground: bpy.types.Object, rate: float, start: int) -> list[SoundStep]:
+    """Sounding steps of the bake on a ground, as `sound.steps_of` has them."""
+    footprints = {step.name: step.footprint for step in baked_ground.steps_of(ground) if step.footprint}
+    return sound.steps_of(footprints, baked_ground.events_of(ground), frame_rate=rate, first_frame=start)
 
 
 def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:
@@ -72,28 +76,29 @@ def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:
     return [(path.name, wave_file.read(path)) for path in paths]
 
 
-def _seen_by_camera(scene: bpy.types.Scene, steps: Sequence[SoundStep]) -> list[SoundStep]:
-    """The steps with the gains of two channels: to the side where the camera sees them, softer the farther they are."""
+def _seen_by_camera(scene: bpy.types.Scene, steps: Sequence[tuple[SoundStep, bpy.types.Object]]) -> list[SoundStep]:
+    """The steps on their grounds with the gains of two channels: to the side where the camera sees them, softer the
+    farther they are."""
     camera = scene.camera
     if camera is None:
         raise InputError(
             f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make the sound "
             "without Stereo from Camera."
         )
-    frame_of_bake = baked_ground.frame_in(baked_ground.load(scene.softground.ground)[1]["inputs"])
+    frames = {ground: baked_steps.frame_of(ground) for _, ground in steps}
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []
     try:
-        for step in steps:
+        for step, ground in steps:
             scene.frame_set(int(step.frame))
-            here = in_scene(step.position, scene, frame_of_bake)
+            here = in_scene(step.position, scene, frames[ground], ground)
             place = camera.matrix_world.inverted() @ Vector(here.tolist())
             seen.append((place.x, max(place.length, 1e-6)))
     finally:
         scene.frame_set(frame, subframe=subframe)
     nearest = min((distance for _, distance in seen), default=1.0)
     gains = (_gains(side / far, nearest / far) for side, far in seen)
-    return [replace(step, gains=gain) for step, gain in zip(steps, gains, strict=True)]
+    return [replace(step, gains=gain) for (step, _), gain in zip(steps, gains, strict=True)]
 
 
 def _gains(side: float, loud: float) -> tuple[float, float]:

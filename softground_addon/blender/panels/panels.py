@@ -14,6 +14,7 @@ from ...core.ground.surfaces import SURFACES
 from ...core.motion.motion import JOINTS
 from ...core.motion.units import scale_to_metres, wrong_unit
 from .. import session, settings
+from ..baking import bake_report
 from ..characters import selection
 from ..characters.character_setup import title_of
 from ..characters.import_fixes import is_captured, stature_of
@@ -244,6 +245,11 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         layout.prop(options, "ground", text="")
         if options.grounds:
             draw_list(layout, options, "grounds", "active_ground", "ground", rows=1, most=5)
+        for ground in bake_report.unlisted(options):
+            row = layout.row(align=True)
+            row.label(text=translated("'{name}' keeps its prints", name=ground.name), icon="INFO", translate=False)
+            row.operator("softground.add_ground", text="", icon="ADD").object = ground.name
+            row.operator("softground.clear_bake", text="", icon="TRASH").object = ground.name
         row = layout.row(align=True)
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")

@@ -13,7 +13,13 @@ from .character import (
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
-from .scene import DEFAULT_CELL_SIZE, SoftGroundFurtherGround, SoftGroundHardGround, SoftGroundSettings
+from .scene import (
+    DEFAULT_CELL_SIZE,
+    SoftGroundFurtherGround,
+    SoftGroundHardGround,
+    SoftGroundPrinted,
+    SoftGroundSettings,
+)
 
 CLASSES = (
     SoftGroundJoint,
@@ -27,6 +33,7 @@ CLASSES = (
     SoftGroundGrounding,
     SoftGroundHardGround,
     SoftGroundFurtherGround,
+    SoftGroundPrinted,
     SoftGroundSettings,
     SoftGroundPreferences,
 )

@@ -97,6 +97,12 @@ class SoftGroundFurtherGround(bpy.types.PropertyGroup):
     under: UNDER
 
 
+class SoftGroundPrinted(bpy.types.PropertyGroup):
+    """A ground that a bake of the scene has left prints on; see `baked_ground.unlisted`."""
+
+    object: PointerProperty(name="Object", type=bpy.types.Object)
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
@@ -105,6 +111,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     grounds: CollectionProperty(name="Further Grounds", type=SoftGroundFurtherGround)
     active_ground: IntProperty(name="Active Ground", options={"HIDDEN"})
+    printed: CollectionProperty(name="Grounds with Prints", type=SoftGroundPrinted, options={"HIDDEN"})
     hard_grounds: CollectionProperty(name="Hard Ground", type=SoftGroundHardGround)
     active_hard_ground: IntProperty(name="Active Hard Ground", options={"HIDDEN"})
     characters: CollectionProperty(name="Characters", type=SoftGroundCharacter)

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.ground_law import load_at
+from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import HeightField
 from ..ground.material import MATERIAL_RANGES, GroundMaterial, Pressure
 from ..ground.soft_ground import SoftGround
 from ..loads.estimate import CharacterLoads
+from ..loads.shared_ground import grounds_under, loads_on
 from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..pressing.contact_layout import STEPS_AT_ONCE as STEPS_AHEAD
@@ -101,7 +103,7 @@ class ShotContacts:
 @sliced
 def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Slices[ShotContacts]:
     """Every contact of the characters, pressed as if the ground had no regions; each character treads on its own prints
-    only, and no weather on them.
+    only, and no weather on them. Of several grounds, those on the first; all of them where none is.
 
     Parameters
     ----------
@@ -110,6 +112,9 @@ def pressed_contacts(loads: Sequence[CharacterLoads], ground: SoftGround, cell_s
     """
     contacts: list[_Contact] = []
     ground = replace(ground, regions=None)
+    if isinstance(several := soft_ground(ground.terrain), SeveralGrounds):
+        of_first = [loads_on(character, grounds_under(character, several), 0) for character in loads]
+        loads = of_first if any(character.contacts.touching.any() for character in of_first) else loads
     for number, character in enumerate(loads):
         cells = UndisturbedCells(ground, max(cell_size, _coarsest(character)))
         contacts += sorted(_laid_out(character, number, cells), key=lambda contact: contact.source.first)

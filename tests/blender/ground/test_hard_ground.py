@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import jobs, settings
-from softground_addon.blender.baking import bake_report, clean_feet
+from softground_addon.blender.baking import bake_job, bake_report, clean_feet
 from softground_addon.blender.operators import bake_result
 from softground_addon.blender.reading.shots import read_shot, settings_of
 from softground_addon.core.composers.responses import standing_on
@@ -218,6 +218,14 @@ def test_a_listed_object_is_as_it_was_after_bake_and_clear(crate):
     bake(scene)
     bpy.ops.softground.clear_bake()
     assert state() == before
+
+
+def test_a_ground_that_is_made_for_the_walk_has_hard_objects_on_it_too(crate):
+    scene = bpy.context.scene
+    scene.softground.ground = None
+    listed(crate)
+    counts = [len(jobs.run(bake_job.bake(scene, write=False)).footprints) for _ in range(2)]
+    assert counts[0] == counts[1] > 0
 
 
 def test_a_deleted_object_is_forgotten_and_removed_from_the_list(crate):

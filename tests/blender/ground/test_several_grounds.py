@@ -1,21 +1,29 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
 import json
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, settings
+from sample_scenes import stage
+from softground_addon.blender import further_grounds, ground_presets, jobs, preset_files, reuse, settings
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.output import event_points, export_formats, sound_exports
+from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.state import state
 from softground_addon.blender.weather import ground_weather
 from softground_addon.core.errors import InputError
+from softground_addon.core.events import sound
 from softground_addon.core.record.edits import StepEdit
+from softground_addon.core.record.typical_depth import typical_of
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
 from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, curves_of, lift
@@ -191,6 +199,24 @@ def test_the_depth_is_predicted_on_all_of_them(crate):
     analysis.read(scene)
     predicted = analysis.expected_depth(scene)
     assert predicted == pytest.approx(bake(scene).report["totals"]["typical_depth_m"], rel=0.05)
+
+
+def test_the_depth_is_predicted_on_the_ground_that_is_shown_in_what_that_is_made_of(crate):
+    scene, options = bpy.context.scene, bpy.context.scene.softground
+    item, slab = also(crate), box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("soft_mud"))
+    bpy.context.view_layer.update()
+    bake(scene)
+    typical = {ground: typical_of(prints_on(ground)) for ground in settings.grounds_of(options)}
+    for _ in typical:
+        analysis.read(scene)
+        predicted = analysis.expected_depth(scene)
+        assert predicted == pytest.approx(typical[options.ground], rel=0.05)
+        further_grounds.choose(options, item)
+    assert max(typical.values()) > 1.5 * min(typical.values())
+    further_grounds.choose(options, also(slab))
+    analysis.read(scene)
+    assert analysis.expected_depth(scene) > 0, "where nobody walks on it, all contacts tell"
 
 
 def test_undo_gives_all_grounds_back_by_bytes(crate):
@@ -563,6 +589,92 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     assert settings.grounds_of(scene.softground)[1:] == [crate]
     assert bake(scene).report["warnings"] == []
+
+
+def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_cleared_or_it_is_listed(crate):
+    scene = bpy.context.scene
+    before, options = fingerprints.of_file(), scene.softground
+    also(crate)
+    bake(scene)
+    prints = bytes_of(prints_on(crate))
+    for take_out in (bpy.ops.softground.remove_ground, options.grounds.clear):
+        assert rows_about(CRATE) == []
+        take_out()
+        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_bake"]
+        assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
+    options.grounds.clear()
+    (note,) = [row for row in bake(scene).report["self_check"] if row["code"] == "unlisted_prints"]
+    assert "'Crate' keeps the prints of an earlier bake" in note["message"]
+    assert bytes_of(prints_on(crate)) == prints
+    assert bpy.ops.softground.clear_bake(object=CRATE) == {"FINISHED"}
+    assert not baked_ground.has_remains(crate)
+    assert baked_ground.is_baked(options.ground)
+    assert rows_about(CRATE) == []
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_it_is_one(crate, tmp_path, monkeypatch):
+    scene = bpy.context.scene
+    also(crate)
+    report = bake(scene).report
+    events, heard, told = tmp_path / "events.jsonl", [], []
+    bpy.ops.softground.export(filepath=str(events), format="EVENTS_JSON")
+    rows = [json.loads(line) for line in events.read_text().splitlines()]
+    rows = [row for row in rows if "step" in row]
+    assert [(row["step"], row["phase"]) for row in rows] == [(row["step"], row["phase"]) for row in report["events"]]
+    bpy.ops.softground.event_markers()
+    assert len(scene.timeline_markers) == sum(row["phase"] in event_points.MARKED for row in rows)
+    monkeypatch.setattr(sound, "footsteps", lambda steps, *_: heard.extend(steps) or np.zeros((9, 1)))
+    stage.add_camera(scene, "Ear", 50.0)
+    scene.camera = bpy.data.objects["Ear"]
+    for stereo in (False, True):
+        heard.clear()
+        sound_exports.write(scene, tmp_path / "steps.wav", 1, 84, stereo=stereo)
+        assert sorted(step.name for step in heard) == sorted(row["id"] for row in report["steps"])
+    monkeypatch.setattr(export_formats, "translated", lambda text, **_: told.append(text) or text)
+    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2")
+    assert told == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
+
+
+def test_a_bake_again_takes_the_prints_of_all_grounds_over_until_something_acts_on_them(crate):
+    scene = bpy.context.scene
+    item, options = also(crate), scene.softground
+    options.hard_grounds.add().object = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+
+    def presses(change):
+        before = state.results["prints", ""][1]
+        change()
+        bake(scene)
+        return state.results["prints", ""][1] is not before
+
+    def soften():
+        further_grounds.own_material(options, item).youngs_modulus *= 0.5
+
+    def shift():
+        crate.location.y += 0.02
+        bpy.context.view_layer.update()
+
+    bake(scene)
+    prints = [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)]
+    assert not presses(lambda: setattr(options, "relief_strength", 0.5))
+    assert [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)] == prints
+    for change in (soften, shift, lambda: further_grounds.choose(options, item)):
+        assert presses(change)
+        as_it_comes = [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)]
+        reuse.forget()
+        bake(scene)
+        assert [bytes_of(prints_on(ground)) for ground in settings.grounds_of(options)] == as_it_comes
+
+
+def rows_about(name):
+    """Operators that the Ground panel offers on an object of a name."""
+    layout, buttons = MagicMock(), []
+    layout.row.return_value = layout
+    layout.operator.side_effect = lambda name, **_: buttons.append((name, button := SimpleNamespace())) or button
+    panels.SOFTGROUND_PT_ground.draw(SimpleNamespace(fields=lambda: layout), bpy.context)
+    return [operator for operator, button in buttons if vars(button).get("object") == name]
 
 
 @pytest.mark.parametrize("is_purged", [True, False])

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import handlers, reuse
+from softground_addon.blender import handlers, reuse, session
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground, created_ground, ground_mesh
@@ -278,6 +278,22 @@ def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_s
 
 def test_a_redraw_looks_at_the_settings_for_a_refusal_only_after_one(live_shot, monkeypatch):
     monkeypatch.setattr(live.settings, "snapshot", MagicMock(side_effect=AssertionError))
+    assert live.refusal() == ""
+
+
+def test_live_mode_that_can_read_its_shot_no_longer_says_why_it_ends_until_the_next_bake(live_shot):
+    live_shot.frame_set(48)
+    shown, rig = display_heights(live_shot), live_shot.softground.characters[0].armature
+    rig.scale = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    analysis.forget()
+    live.answer(np.inf)
+    assert not live.is_on()
+    assert live.refusal().startswith("Live mode has ended: ")
+    assert rig.name in live.refusal()
+    assert (display_heights(live_shot) == shown).all()
+    session.show_bake(0.0, "")
+    session.show_no_bake()
     assert live.refusal() == ""
 
 
