@@ -187,7 +187,8 @@ class SOFTGROUND_OT_create_ground(Reading):
                 before = options.ground
                 created_ground.publish(scene, ground, wanted.surface)
                 if before and not has_first:  # it was the next in the list
-                    further_grounds.own_material(options, further_grounds.add(options, before))
+                    options.ground = before
+                    further_grounds.choose(options, further_grounds.add(options, ground))
         created_ground.select(scene, ground)
         count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
         text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)

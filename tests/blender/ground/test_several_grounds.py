@@ -699,10 +699,13 @@ def test_a_ground_that_is_created_in_the_place_of_one_that_was_deleted_leaves_th
     options = bpy.context.scene.softground
     item = also(crate)
     ground_presets.make_of(options, further_grounds.own_material(options, item), preset_files.named("mud"))
+    item.painted.rim, item.under = "Edge", "NEVER"
     delete(options.ground)
     assert bpy.ops.softground.create_ground(use_selected=False) == {"FINISHED"}
     assert settings.grounds_of(options) == [options.ground, crate]
-    assert options.grounds[0].material.surface == "mud"
+    (item,) = options.grounds
+    assert (item.material.surface, item.painted.rim, item.under) == ("mud", "Edge", "NEVER")
+    assert (options.painted.rim, options.under) == ("softground_rim_factor", "AUTO")
 
 
 def delete(obj):
