@@ -137,7 +137,7 @@ def discard() -> None:
     """End live mode and take its prints off the ground, as the file or the add-on is about to go."""
     if state.live is not None:
         state.live.discard()
-        forget()
+    forget()
 
 
 def _scene() -> bpy.types.Scene | None:

@@ -297,6 +297,12 @@ def test_live_mode_that_can_read_its_shot_no_longer_says_why_it_ends_until_the_n
     assert live.refusal() == ""
 
 
+def test_another_file_does_not_say_why_live_mode_has_ended_in_the_last(scene):
+    live.forget("the rig is too small")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert live.refusal() == ""
+
+
 @pytest.mark.slow
 def test_cells_that_nobody_waits_for_are_refused_in_words_and_the_prints_stay(live_shot):
     live_shot.frame_set(48)
