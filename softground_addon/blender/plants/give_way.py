@@ -43,7 +43,7 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
         The objects that show the prints.
     """
     follows, instances = _follows(obj, grounds), _instances_of(obj)
-    height = _height_of(obj, instances)
+    height, unit_scale = _height_of(obj, instances), bpy.context.scene.unit_settings.scale_length
     modifier = modifier_of(obj)
     if modifier is None:
         modifier = cast("Any", obj.modifiers.new(MODIFIER, "NODES"))
@@ -52,13 +52,13 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
     plant = PLANTS.get(kind, PLANTS["MEADOW"])[1]
     values: Mapping[str, Any] = {
         "Table": table,
-        "Height": height or plant.height,
+        "Height": height or plant.height / unit_scale,
         "Stiffness": plant.stiffness,
         "Recovery": plant.recovery,
         "Breaks": plant.breaks,
         "Half After": plant.half_after,
         "Stands": kind not in LITTER,
-        "Rolls": LITTER.get(kind, 0.0),
+        "Rolls": LITTER.get(kind, 0.0) / unit_scale,
         "Sinks": not follows,
         "Loose Parts": obj.type == "MESH" and obj not in grounds and not len(instances),
     }

@@ -366,6 +366,13 @@ def test_pebbles_roll_along_on_hard_ground_evenly_slowed_down_and_are_pressed_in
     np.testing.assert_allclose(rolled(200.0)[table.sink[number] < -1e-3], 0.0, atol=1e-6)
 
 
+def test_pebbles_roll_as_far_in_a_scene_of_other_units(scene):
+    scene.unit_settings.scale_length = 0.01
+    scene.softground.ground = plane(scene, 600.0, 10)
+    modifier = give_way(scattered(np.zeros((1, 3))), kind="PEBBLES")
+    assert compat.read_input(modifier, inputs_of(modifier)["Rolls"]) == pytest.approx(12.0)
+
+
 def test_litter_is_thrown_by_soles_that_lift_as_fast_as_they_throw_debris_and_lies_on_the_ground_again(shot):
     place = roots(1500)
     leaves = scattered(place)
