@@ -9,7 +9,6 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core.ground.material import STANDARD_GRAVITY
 from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
 from .. import compat, mesh_arrays
@@ -106,7 +105,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     meta = (
         (columns, side, units.frame_rate * stretch),
         (columns * side - 1, rows * side - 1, active.min()),
-        (size / scale, STANDARD_GRAVITY / scale, THROWN_FROM / scale),
+        (size / scale, units.gravity_m_s2 / scale, THROWN_FROM / scale),
     )
     is_second = np.ones(len(active) + 2, bool)
     is_second[trampled.first] = is_second[-2:] = False

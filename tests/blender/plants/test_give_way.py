@@ -404,6 +404,16 @@ def test_litter_is_thrown_by_soles_that_lift_as_fast_as_they_throw_debris_and_li
     assert flying[2] == pytest.approx(0.25 * way, abs=0.045)  # above the ground there, which prints have changed
 
 
+def test_litter_is_thrown_by_the_gravity_of_the_scene(shot):
+    give_way(scattered(roots(10)), kind="LITTER")
+    shot.gravity = (0.0, 0.0, -1.62)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    vertices = trampling_table.of(shot.softground.ground).data
+    numbers = np.empty(3 * len(vertices.vertices), np.float32)
+    vertices.attributes[give_way_nodes.META].data.foreach_get("vector", numbers)
+    assert numbers.reshape(-1, 3)[2, 1] == pytest.approx(1.62)
+
+
 def test_a_rim_covers_half_of_the_litter_that_it_rises_under(shot):
     place = roots(3000)
     leaves = scattered(place)
