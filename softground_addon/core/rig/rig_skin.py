@@ -232,7 +232,10 @@ def _carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
 
 
 def _left_behind(skin: RigSkin, bones: RigBones, poses: Recording) -> NDArray[np.bool_]:
-    """Parts that stay where they are in all poses while the others go away, as a floor on a root bone does."""
+    """Parts that stay where they are in all poses while the others, which are no fewer, go away from them.
+
+    A floor on a root bone does; a figure that stands still while a ball of its rig flies off does not.
+    """
     count = len(skin.bones) + 1
     size = np.bincount(skin.part, minlength=count)
     middle = np.stack([np.bincount(skin.part, along, count) for along in skin.vertices.T], axis=-1)
@@ -247,7 +250,7 @@ def _left_behind(skin: RigSkin, bones: RigBones, poses: Recording) -> NDArray[np
     for part in np.flatnonzero(used & still) if len(moves) else ():
         gap = np.linalg.norm(path[moves] - path[part], axis=-1).min(axis=0)
         behind[part] = np.ptp(gap) > far
-    return behind
+    return behind & (np.count_nonzero(behind) <= len(moves))
 
 
 def _probes(recording: Recording) -> Recording:
