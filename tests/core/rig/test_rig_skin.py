@@ -23,7 +23,7 @@ HEADS = {"root": (0.0, 0.0, 0.0), "hips": (0.0, 0.0, 1.0), "leg": (0.0, 0.0, 0.4
 )
 def test_a_body_leaves_behind_what_is_less_than_it(goes, body):
     bones = {
-        name: RestBone("root" if name != "root" else "", np.eye(4), np.array(head), np.array(head) + (0, 1, 0), 1.0)
+        name: RestBone("root" if name != "root" else "", np.eye(4), np.array(head), np.add(head, (0, 1, 0)), 1.0)
         for name, head in HEADS.items()
     }
     vertices = np.concatenate([np.random.default_rng(0).uniform(-0.1, 0.1, (9, 3)) + head for head in HEADS.values()])
