@@ -29,8 +29,7 @@ _BROAD = 0.01
 def with_static(capture: Capture, static: Capture) -> Capture:
     """A capture with the markers that it lacks and a static trial has, each moved along by the nearest cluster.
 
-    A cluster are three or more markers of both trials that keep their distances. Markers near which there is none stay
-    out.
+    A cluster is three or more markers of both trials that keep their distances. Markers without a cluster stay out.
     """
     paths = {label: bridged(path) for label, path in _seen(capture).items()}
     places = {label: np.nanmedian(path, axis=0) for label, path in _seen(static).items()}

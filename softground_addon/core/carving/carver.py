@@ -274,7 +274,7 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     return np.where(laid > THINNEST * laid.max(), laid, 0.0)
 
 
-@lru_cache(64)
+@lru_cache(8)
 def _smoothing(count: int, width: int) -> Array:
     """The matrix (count, count) that takes means over an odd number of cells twice; nothing is beyond the edges."""
     away = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))

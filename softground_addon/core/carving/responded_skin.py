@@ -103,7 +103,10 @@ class RespondedSkin:
         return skinned(self._worn.skin, self._worn.bones, recording, chosen).astype(float)
 
     def near(self, terrain: Terrain, distance: float) -> Mask:
-        """Vertices (V,) of bones that come within a distance of a terrain [m], and of shapes or no bones."""
+        """Vertices (V,) of bones that come within a distance of a terrain [m], and of shapes or no bones.
+
+        The terrain is looked up at the corners and the middle of a box around each bone's vertices.
+        """
         skin, bones = self._worn.skin, self._worn.bones
         near = np.ones(len(skin.vertices), dtype=bool)
         for vertices, _ in skin.weights:
@@ -113,8 +116,9 @@ class RespondedSkin:
             if not len(rest):
                 continue
             box = np.stack(np.meshgrid(*zip(rest.min(axis=0), rest.max(axis=0), strict=True), 1.0)).reshape(4, -1)
+            box = np.column_stack([box, box.mean(axis=1)])
             x, y, z, _ = (self._recording.bone(name) @ np.linalg.inv(bones[name].matrix) @ box).swapaxes(0, 1)
-            if not (z.min(axis=-1) >= terrain.heights(x.mean(axis=-1), y.mean(axis=-1)) + distance).all():
+            if not (z.min(axis=-1) >= terrain.heights(x, y).max(axis=-1) + distance).all():
                 near[vertices] = True
         for shape in skin.shapes:
             near[shape.vertices] = True

@@ -245,11 +245,19 @@ class SampledGrid(SparseGrid):
         """A copy of the values of a window, (channels, rows, columns)."""
         values = np.empty((self.channels, window.rows, window.columns))
         for key, in_tile, in_window in overlaps(window):
-            if key not in self.tiles:
-                tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
-                self.tiles[key] = self._sample(*np.meshgrid(*tile.centres(self.cell_size)))
-            values[in_window] = self.tiles[key][in_tile]
+            values[in_window] = self._tile(key)[in_tile]
         return values
+
+    def write(self, window: Window, values: Array) -> None:
+        """Set the values of a window, (channels, rows, columns); those beside it are as they were sampled."""
+        for key, in_tile, in_window in overlaps(window):
+            self._tile(key)[in_tile] = values[in_window]
+
+    def _tile(self, key: tuple[int, int]) -> Array:
+        if key not in self.tiles:
+            tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
+            self.tiles[key] = self._sample(*np.meshgrid(*tile.centres(self.cell_size)))
+        return self.tiles[key]
 
 
 def overlaps(window: Window) -> Iterator[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:

@@ -41,8 +41,8 @@ SAME_LAYER = 1e-3
 def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
     """The plane of a mesh that is a level rectangle along the axes without a hole; None of any other.
 
-    Every edge that is not on its sides is that of two triangles: so as many of them cover one place as any other, and
-    they do not turn over.
+    Every edge that is not on its sides has as many triangles to its right as to its left: so as many of them cover one
+    place as any other, and they do not turn over.
 
     Parameters
     ----------
@@ -60,9 +60,11 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
     if not (turn > 0).all():
         return None
     yield
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, first, count = np.unique(edges @ (len(vertices), 1), return_index=True, return_counts=True)
-    begin, end = place[edges[first[count != 2]]].swapaxes(0, 1)
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    keys = np.sort(edges, axis=1) @ (len(vertices), 1)
+    _, first, number = np.unique(keys, return_index=True, return_inverse=True)
+    sides = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1, -1))
+    begin, end = place[edges[first[sides != 0]]].swapaxes(0, 1)
     if not ((begin == end) & ((begin == low) | (begin == high))).any(axis=1).all():
         return None
     return FlatTerrain(float(vertices[0, 2]), tuple(low.tolist()), tuple(high.tolist()))

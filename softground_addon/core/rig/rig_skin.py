@@ -132,8 +132,8 @@ _PROBES = 8
 """Poses in which the vertices near the ground are looked for, and what a body leaves behind."""
 
 _LEAVES, _STAYS = 0.5, 1e-3
-"""Where all that moves goes this much farther away from a part, over the size of the body, it leaves what moves less
-than this over that way."""
+"""Way that all moving parts go away from a part that is left behind, over the size of the body, and most that this part
+itself moves, over that way."""
 
 _NEAR = 0.15
 """Distance from the lowest vertex that a followed one comes within, in body heights."""
@@ -217,8 +217,8 @@ def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
 def of_body(skin: RigSkin, bones: RigBones, recording: Recording) -> NDArray[np.bool_]:
     """Vertices (V,) of the body itself: not of props that it carries, nor of what it leaves behind."""
     parts = np.append([name in recording.bones for name in skin.bones], True)
-    left = _left_behind(skin, bones, _probes(recording)) if parts.all() else ~parts
-    return ~(_carried(skin, bones) | left[skin.part])
+    behind = _left_behind(skin, bones, _probes(recording)) if parts.all() else ~parts
+    return ~(_carried(skin, bones) | behind[skin.part])
 
 
 def _carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
@@ -232,7 +232,10 @@ def _carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
 
 
 def _left_behind(skin: RigSkin, bones: RigBones, poses: Recording) -> NDArray[np.bool_]:
-    """Parts that stay where they are in all poses while the others go away, as a floor on a root bone does."""
+    """Parts that stay where they are in all poses while the others, which are no fewer, go away from them.
+
+    A floor on a root bone does; a figure that stands still while a ball of its rig flies off does not.
+    """
     count = len(skin.bones) + 1
     size = np.bincount(skin.part, minlength=count)
     middle = np.stack([np.bincount(skin.part, along, count) for along in skin.vertices.T], axis=-1)
@@ -243,11 +246,11 @@ def _left_behind(skin: RigSkin, bones: RigBones, poses: Recording) -> NDArray[np
     far = _LEAVES * np.ptp(path[used, 0], axis=0).max(initial=0.0)
     still = np.ptp(path, axis=1).max(axis=-1) < _STAYS * far
     moves = np.flatnonzero(used & ~still)
-    left = np.zeros(count, dtype=bool)
+    behind = np.zeros(count, dtype=bool)
     for part in np.flatnonzero(used & still) if len(moves) else ():
         gap = np.linalg.norm(path[moves] - path[part], axis=-1).min(axis=0)
-        left[part] = np.ptp(gap) > far
-    return left
+        behind[part] = np.ptp(gap) > far
+    return behind & (np.count_nonzero(behind) <= len(moves))
 
 
 def _probes(recording: Recording) -> Recording:

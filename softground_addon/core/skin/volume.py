@@ -112,7 +112,8 @@ def body_volume(points: Array, triangles: Indices) -> Slices[float]:
     """
     if not len(triangles):
         return 0.0
-    corners = np.sort(triangles, axis=1)
+    # From the least corner on: those that face the other way, as of a skin with two sides, are no copies.
+    corners = np.take_along_axis(triangles, (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     _, once = np.unique((corners[:, 0] * len(points) + corners[:, 1]) * len(points) + corners[:, 2], return_index=True)
     triangles = triangles[once]  # a copy of the skin in its place, as an outline or another level of detail, is none
     known = pieces(points, triangles)

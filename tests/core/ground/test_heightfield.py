@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, TerrainTiles
-from softground_addon.core.ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window
+from softground_addon.core.ground.sparse_grid import PLACES_AT_ONCE, TILE, SampledGrid, SparseGrid, Window
 from tests.core.walkers import memory_of
 
 windows = st.builds(
@@ -114,6 +114,12 @@ def test_of_many_places_only_what_is_found_takes_more_memory():
 def test_a_cell_size_that_is_no_length_is_refused_with_a_remedy(size):
     with pytest.raises(InputError, match="set it to a positive length"):
         SparseGrid(size, channels=1)
+
+
+def test_what_is_sampled_stays_beside_what_is_written_first():
+    grid = SampledGrid(lambda x, y: np.full((1, *x.shape), 3.0), 0.01, channels=1)
+    grid.write(Window(0, 0, 2, 2), np.zeros((1, 2, 2)))
+    assert grid.read(Window(0, 0, 3, 1)).tolist() == [[[0.0, 0.0, 3.0]]]
 
 
 class Counting:

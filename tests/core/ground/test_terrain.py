@@ -164,6 +164,9 @@ def test_where_surfaces_lie_one_above_the_other_the_values_are_those_of_the_high
 
 SQUARE = np.array([(0.0, 0.0, 1.5), (2.0, 0.0, 1.5), (2.0, 1.0, 1.5), (0.0, 1.0, 1.5), (1.0, 0.5, 1.5)])
 FANS = np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+HOLE = np.array([(1.0, 1.0, 0.0), (2.0, 1.0, 0.0), (2.0, 2.0, 0.0), (1.0, 2.0, 0.0)])
+CORNERS = np.array([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 3.0, 0.0), (0.0, 3.0, 0.0)])
+AROUND = np.array([(4, 5, 1), (4, 1, 0), (5, 6, 2), (5, 2, 1), (6, 7, 3), (6, 3, 2), (7, 4, 0), (7, 0, 3)])
 
 
 def test_a_level_rectangle_is_the_plane_that_it_shows():
@@ -179,6 +182,10 @@ def test_a_level_rectangle_is_the_plane_that_it_shows():
         (SQUARE, FANS[:3]),  # a gap
         (SQUARE, FANS[:, ::-1]),  # turned over
         (SQUARE, np.concatenate([FANS[:3], FANS[:1]])),  # as large as if it had none
+        (  # a hole whose edges belong to two triangles each, on one side
+            np.concatenate([HOLE, CORNERS, CORNERS]),
+            np.concatenate([AROUND, np.where(AROUND < 4, AROUND, AROUND + 4)]),
+        ),
         (SQUARE + np.array([(0, 0, 0)] * 4 + [(0, 0, 1e-6)]), FANS),
         (SQUARE @ [[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], FANS),
     ],

@@ -100,6 +100,14 @@ def test_a_copy_of_the_skin_in_its_place_counts_once():
     assert body_volume(vertices, np.concatenate([triangles, corners])) == pytest.approx(BALL, rel=0.02)
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_faces_that_lie_on_each_other_back_to_back_take_nothing_away(share):
+    vertices, triangles = sphere(1.0)
+    backs = triangles[: round(share * len(triangles)), ::-1]
+    faces = np.random.default_rng(0).permutation(np.concatenate([triangles, backs]))
+    assert body_volume(vertices, faces) == pytest.approx(BALL, rel=0.02)
+
+
 def test_what_is_flat_holds_nothing():
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-1.0, 1.0, 9))
     flat = np.stack([x, 0 * x, y], -1).reshape(-1, 3)
