@@ -583,9 +583,10 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     bake(scene)
     assert baked_ground.display_mesh_of(crate) != crate
     bpy.ops.softground.remove_ground()
-    (warning,) = bake(scene).report["warnings"]
+    warning, note = bake(scene).report["warnings"]
     assert "Press Add 'Crate'" in warning
     assert "Add 'Crate' as Ground" in warning
+    assert "'Crate' keeps the prints of an earlier bake" in note
     assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     assert settings.grounds_of(scene.softground)[1:] == [crate]
     assert bake(scene).report["warnings"] == []
