@@ -387,8 +387,8 @@ def test_a_body_with_another_axis_up_is_noticed_and_turned_on_request(axis, body
         body(lying(axis), mass=MASS)
     assert (noticed.value.code, noticed.value.facts["up"]) == ("wrong_axis", axis)
     turned, upright = body(lying(axis), mass=MASS, up=axis), body(lying("Z"), mass=MASS)
-    for one, other in zip(turned.shape.soles, upright.shape.soles, strict=True):
-        np.testing.assert_allclose(one.landmark_positions(), other.landmark_positions(), atol=1e-9)
+    for sole, other in zip(turned.shape.soles, upright.shape.soles, strict=True):
+        np.testing.assert_allclose(sole.landmark_positions(), other.landmark_positions(), atol=1e-9)
     with pytest.raises(softground.InputError, match="must be one of X"):
         body(lying(axis), mass=MASS, up="up")
 

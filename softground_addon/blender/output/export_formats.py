@@ -370,9 +370,8 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         start, end = (self.frame_start, self.frame_end) if set_frames else (options.frame_start, options.frame_end)
         path = Path(bpy.path.abspath(self.filepath)) if self.filepath else default_path(options.ground, self.format)
         path = with_suffix(path, self.format)
-        written = export(
-            scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
-        )
+        wanted = Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
+        written = export(scene, wanted)
         if FORMATS[self.format].of_ground and len(bake_report.baked_grounds(options)) > 1:
             text = "Wrote ground '{name}' alone: show another one in the Ground panel to write that too"
             text = translated(text, name=options.ground.name)

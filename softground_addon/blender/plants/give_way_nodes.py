@@ -285,10 +285,10 @@ def _given_way(
     sent = litter_nodes.sent_off(graph, passes, latest, chance)
     way_there = zip(place, graph.parts(sent), strict=False)
     place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
-    there = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
-    there = graph.choose("INT", table.stands, there, latest.socket)
+    acting = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
+    acting = graph.choose("INT", table.stands, acting, latest.socket)
     lean, further, share, ground = (
-        graph.at_index(passes.vertices, value, there)
+        graph.at_index(passes.vertices, value, acting)
         for value in (passes.lean, passes.further, passes.share, passes.ground)
     )
     remain, bent, bent_further = graph.parts(share)

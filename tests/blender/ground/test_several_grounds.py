@@ -583,9 +583,10 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     bake(scene)
     assert baked_ground.display_mesh_of(crate) != crate
     bpy.ops.softground.remove_ground()
-    (warning,) = bake(scene).report["warnings"]
+    warning, note = bake(scene).report["warnings"]
     assert "Press Add 'Crate'" in warning
     assert "Add 'Crate' as Ground" in warning
+    assert "'Crate' keeps the prints of an earlier bake" in note
     assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     assert settings.grounds_of(scene.softground)[1:] == [crate]
     assert bake(scene).report["warnings"] == []
@@ -618,7 +619,7 @@ def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_i
     scene = bpy.context.scene
     also(crate)
     report = bake(scene).report
-    events, heard, told = tmp_path / "events.jsonl", [], []
+    events, heard, messages = tmp_path / "events.jsonl", [], []
     bpy.ops.softground.export(filepath=str(events), format="EVENTS_JSON")
     rows = [json.loads(line) for line in events.read_text().splitlines()]
     rows = [row for row in rows if "step" in row]
@@ -632,9 +633,9 @@ def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_i
         heard.clear()
         sound_exports.write(scene, tmp_path / "steps.wav", 1, 84, stereo=stereo)
         assert sorted(step.name for step in heard) == sorted(row["id"] for row in report["steps"])
-    monkeypatch.setattr(export_formats, "translated", lambda text, **_: told.append(text) or text)
+    monkeypatch.setattr(export_formats, "translated", lambda text, **_: messages.append(text) or text)
     bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2")
-    assert told == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
+    assert messages == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
 
 
 def test_a_bake_again_takes_the_prints_of_all_grounds_over_until_something_acts_on_them(crate):
