@@ -128,7 +128,8 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
     prints = replace(prints, grounds=tuple(replace(ground, made_with=each) for ground, each in pairs))
     # What is reported of them is held with them: nothing else has its identity meanwhile.
     compared = id(prints.reported), [ground.name for ground in wanted.soft_grounds]
-    _, findings = yield from reused(begun, "findings", compared, _checked(wanted, shot, prints))
+    at_end = Progress("simulate", 1.0)
+    _, findings = yield from reused(at_end, "findings", compared, _checked(wanted, shot, prints))
     return replace(prints, findings=findings)
 
 

@@ -20,7 +20,8 @@ from ..soles.undersides import lowest_surface
 from .film import zone_of
 
 ALONG_SOLE = 13
-"""Nodes of the grid along a sole: 2.3 cm for an adult, 9 kB a step in a file. The outline between them is that of the distances to it."""
+"""Nodes of the grid along a sole: 2.3 cm for an adult, 10 kB a step in a file. The outline between them is that of the
+distances to it."""
 ACROSS_PROP = 24
 """Nodes along a cube as large as a wheel, a ball or a hand."""
 BEDDING = 1e7
