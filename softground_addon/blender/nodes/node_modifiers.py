@@ -65,7 +65,8 @@ def curves_of(modifier: Any) -> dict[str, bpy.types.FCurve]:
     if animation is None or animation.action is None:
         return {}
     curves = compat.action_curves(animation.action, compat.slot_of(animation))
-    paths = {compat.input_path(modifier, identifier): name for name, identifier in inputs_of(modifier).items()}
+    valued, inputs = dict(compat.node_inputs(modifier)), inputs_of(modifier)  # a geometry has no value
+    paths = {compat.input_path(modifier, each): name for name, each in inputs.items() if each in valued}
     return {paths[curve.data_path]: curve for curve in curves if curve.data_path in paths and not curve.mute}
 
 
