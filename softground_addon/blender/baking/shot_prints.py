@@ -69,6 +69,9 @@ class ShotPrints:
     ----------
     grounds : tuple of GroundPrints
         Those of each ground.
+    loads : list of CharacterLoads
+        On all grounds together.
+    responses : list of CharacterResponse
     reported : mapping
         Offsets, forces and gaps, for the report.
     findings : tuple of Finding
