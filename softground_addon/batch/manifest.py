@@ -356,7 +356,7 @@ def check_places(
     for shot in shots:
         for preset in (shot.preset, *(ground.rpartition("=")[2] for ground in shot.grounds)):
             if preset.lower().endswith(".json"):
-                read[identity(Path(preset))] = f"the preset of '{shot.name}'"
+                read[identity(Path(preset))] = f"a preset of '{shot.name}'"
         if shot.edits:
             read[identity(shot.edits)] = f"the edits of '{shot.name}'"
     sources: dict[str, list[str]] = {}

@@ -214,7 +214,7 @@ def test_bad_input_exits_with_2_before_anything_is_baked(night, capfd, text, opt
         ("save = 'b.blend'", ("--report", "../{}/000.BLEND"), "'--report' would write over the shot"),
         ("save = 'b.blend'", ("--report", "night.toml"), "'--report' would write over the manifest"),
         ("save = 'b.blend'", ("--report", "b.blend"), "both write"),
-        ("save = 'b.blend', preset = 'bog.json'", ("--report", "bog.json"), "the preset of '000'"),
+        ("save = 'b.blend', preset = 'bog.json'", ("--report", "bog.json"), "a preset of '000'"),
         ("save = 'b.blend'", ("--report", "night.batch/000.receipt.json"), "the receipt of '000'"),
         ("save = 'night.batch/000.log'", (), "the log of '000'"),
         ("report = 'state/000.lock'", ("--state", "state"), "the lock of '000'"),
