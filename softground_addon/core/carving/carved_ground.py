@@ -19,7 +19,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut
+from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut, pieces
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -245,19 +245,23 @@ class CarvedGround:
             self._settling[step] = self._frames_to_rest
 
     def settle(self, bodies: Sequence[Drawn], frame: float) -> None:
-        """Let what steps have carved slide on around bodies; at the end, all of it is recorded."""
+        """Let walls crumble at first, and what is loose slide on around bodies; at the end, all of it is recorded."""
         for step, frames in list(self._settling.items()):
-            holds = step.walls.strength > 0
+            holds, begins = step.walls.strength > 0, frames == self._frames_to_rest
+            crumbling = step.walls.crumbling if begins else 0.0
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
             cells, _ = self._read(window)
-            window = window.expanded(step.walls.reach(cells.surface, cells.loose, self._cell_size))
+            window = window.expanded(step.walls.reach(cells.surface, cells.loose + crumbling, self._cell_size))
             cells, channels = self._read(window)
-            if not holds and frames == self._frames_to_rest:
+            held = self._held(bodies, window, cells)
+            if crumbling:
+                cells.crumble(pieces(window, self._cell_size, crumbling), held)
+            if not holds and begins:
                 cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
             cells.slide(
                 step.walls,
-                self._held(bodies, window, cells),
+                held,
                 (window.row, window.column),
                 ceil(sweeps / self._frames_to_rest),
             )

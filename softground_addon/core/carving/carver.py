@@ -18,11 +18,14 @@ from functools import lru_cache
 from math import ceil, pi, tan
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..ground.material import GroundMaterial
+from ..ground.sparse_grid import Window
 from ..ground.surfaces import SurfaceRecord
 from ..numerics.arrays import Array, Mask
 from ..pressing.repose import slid
+from ..relief.lattice_noise import noise
 
 TOLERANCE = 1e-3
 """Skin that is less deep in the ground does not cut it [m]."""
@@ -39,6 +42,12 @@ THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
 then anywhere."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
+EDGE, LEAST_DROP = 0.03, 0.06
+"""A wall breaks off within such a distance of ground that lies so much lower [m]."""
+PIECES, SEED = (0.05, 0.02), 431
+"""Sizes of the pieces [m], and the number that their noise begins with."""
+MOST_OF_DROP = 0.7
+"""Part of a drop that breaks off at most."""
 REACH = 0.04
 """How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
 
@@ -55,11 +64,14 @@ class Walls:
         Height up to which a wall stands [m]: Hc = 4·c/(rho·g)·tan(45° + phi/2) (Terzaghi 1943, a vertical cut).
     repose : float
         Angle of repose of loose matter [rad].
+    crumbling : float
+        Depth to which their edges break off [m].
     """
 
     packing: float
     strength: float
     repose: float
+    crumbling: float = 0.0
 
     @classmethod
     def of(cls, surface: SurfaceRecord, material: GroundMaterial, gravity: float) -> Walls:
@@ -74,7 +86,8 @@ class Walls:
         """
         repose = material.repose_angle or np.radians(surface.thrown.repose)
         cut = 4.0 * surface.wall_cohesion / (surface.density * gravity) if gravity else np.inf
-        return cls(surface.wall_packing, cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0, repose)
+        strength = cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0
+        return cls(surface.wall_packing, strength, repose, surface.wall_crumbling)
 
     def reach(self, surface: Array, loose: Array, cell_size: float) -> int:
         """Number of cells around a window that what slides may spread over, from its heights (rows, columns) [m]."""
@@ -209,6 +222,28 @@ class CarvedCells:
         if others.any() and abs(share) < least:
             self.loose = np.where(thin, shown, self.loose + share * others)
 
+    def crumble(self, deepest: Array, body: Mask) -> None:
+        """Let the edges of walls break off: what breaks lies loose where it stood.
+
+        Parameters
+        ----------
+        deepest : (rows, columns) float array
+            Depth to which each place may break off [m]; see `pieces`.
+        body : (rows, columns) bool array
+            Cells with a body in the ground, which holds them.
+        """
+        standing = self.standing
+        surface = standing + self.loose
+        drops = [standing - _lowest_around(surface, ceil(part * EDGE / self.cell_size)) for part in (1 / 3, 2 / 3, 1)]
+        near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
+        broken = np.minimum(deepest * near, MOST_OF_DROP * np.maximum(drops[-1], 0.0))
+        broken[self.closed | self.contact | body] = 0.0
+        breaks = broken > 0
+        self.lowest[:, breaks] = (np.minimum(self.pressed, self.lowest) - broken)[:, breaks]
+        fallen = standing - self.standing
+        self.cut_height += float(fallen.sum())
+        self.loose += fallen
+
     def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
         """Let slide what is too steep; a body that stands in the ground holds it.
 
@@ -244,6 +279,22 @@ class CarvedCells:
 def least_cut(contact: Mask, cell_size: float) -> Array:
     """Least depth in the ground that is cut, from the cells (rows, columns) under soles that press [m]."""
     return np.where(contact, min(UNDER_SOLE, cell_size), TOLERANCE)
+
+
+def pieces(window: Window, cell_size: float, crumbling: float) -> Array:
+    """Depth to which each cell of a window may break off, (rows, columns) [m], in pieces of all `PIECES`."""
+    x, y = (axis.ravel() for axis in np.meshgrid(*window.centres(cell_size)))
+    above = sum((noise(SEED + number, size, x, y) for number, size in enumerate(PIECES)), np.zeros(len(x)))
+    return np.asarray(crumbling * np.maximum(above, 0.0)).reshape(window.rows, window.columns)
+
+
+def _lowest_around(heights: Array, reach: int) -> Array:
+    """Lowest height (rows, columns) within so many cells along both axes of each."""
+    for axis in (0, 1):
+        sides = [(reach, reach) if each == axis else (0, 0) for each in (0, 1)]
+        padded = np.pad(heights, sides, constant_values=np.inf)
+        heights = sliding_window_view(padded, 2 * reach + 1, axis=axis).min(axis=-1)
+    return heights
 
 
 def _middle(quarters: Array) -> Array:

@@ -208,6 +208,8 @@ class SurfaceRecord:
     wall_cohesion : float
         Cohesion by which such a wall stands [Pa]: of snow for walls of 0.9 m; of wet
         sand by capillarity; dry sand has none (by eye, and by the yield stress of mud).
+    wall_crumbling : float
+        Depth to which the edge of such a wall breaks off, at most places at most [m] (by eye); 0 where it flows.
     soaking : Soaking or None
         How it takes up rain: sand, loam and clay, dry; wet sand has had its first rain. None of snow, which takes up
         what falls.
@@ -236,6 +238,7 @@ class SurfaceRecord:
     midi_note: int
     wall_packing: float = 0.0
     wall_cohesion: float = 0.0
+    wall_crumbling: float = 0.0
     soaking: Soaking | None = None
     drifts_from: float | None = None
     melts: bool = False
@@ -263,7 +266,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(1.0, 0.25, 0.3, 0.0, (1000, 4000), (0.0015, 0.004), 220.0, 1.5, (1500, 6000), (80, 150)),
         colour=(0.87, 0.90, 0.94), under=(0.12, 0.07, 0.04), shades=(0.92, 1.0), swell=0.50,
         shader="snow", relief="snow", midi_note=36,
-        wall_packing=0.73, wall_cohesion=180.0,
+        wall_packing=0.73, wall_cohesion=180.0, wall_crumbling=0.06,
         drifts_from=0.27, melts=True, control="hand_hardness",
         carried=CarriedFilm("snow", most=0.3, taken=0.2, deposited=0.5, water=1.0),
     ),
@@ -286,7 +289,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.25, 0.7, 0.5, 0.15, (800, 3000), (0.001, 0.003), 200.0, 1.6, (600, 3500), (70, 120)),
         colour=(0.24, 0.16, 0.09), under=(0.09, 0.085, 0.08), shades=(0.74, 1.18), swell=0.14,
         shader="wet_sand", relief="wet_sand", midi_note=44,
-        wall_packing=0.05, wall_cohesion=1000.0,
+        wall_packing=0.05, wall_cohesion=1000.0, wall_crumbling=0.03,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
         carried=CarriedFilm("sand", most=0.8, taken=0.5, deposited=0.35, water=0.2),
     ),
@@ -313,7 +316,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(0.9, 0.35, 0.45, 0.0, (500, 3000), (0.002, 0.007), 500.0, 1.3, (400, 2500), (70, 140)),
         colour=(0.12, 0.07, 0.04), under=(0.28, 0.16, 0.07), shades=(0.70, 1.25), swell=0.16,
         shader="soil", relief="soil", midi_note=52,
-        wall_packing=0.15, wall_cohesion=1000.0,
+        wall_packing=0.15, wall_cohesion=1000.0, wall_crumbling=0.05,
         soaking=Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0), control="soil_moisture",
     ),
 )}  # fmt: skip

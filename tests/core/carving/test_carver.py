@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softground_addon.core.carving.carver import REACH, CarvedCells, Walls
+from softground_addon.core.carving.carver import EDGE, REACH, CarvedCells, Walls, pieces
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.pressing.repose import NEIGHBOURS, SWEEPS_TO_REST
 
@@ -184,3 +185,51 @@ def test_a_wall_is_as_high_as_a_vertical_cut_may_be():
     """Terzaghi: Hc = 4·c/(rho·g)·tan(45° + phi/2); of mud of 2 kPa and 1,700 kg/m³ at 15°, 0.625 m."""
     assert walls_of("mud").strength == pytest.approx(4 * 2000 / (1700 * 9.81) * np.tan(np.radians(52.5)), rel=1e-12)
     assert walls_of("sand").strength == 0.0
+
+
+def trench(cell_size, surface, bottom=-0.3):
+    """A trench of 0.2 m in a square of 0.6 m, with its walls."""
+    count = round(0.6 / cell_size)
+    nothing, flat = np.zeros((count, count), bool), np.zeros((count, count))
+    quarters = np.full((4, count, count), np.inf)
+    cells = CarvedCells(cell_size, flat, nothing, nothing.copy(), flat.copy(), quarters, flat.copy())
+    quarters[:, :, round(0.2 / cell_size) : round(0.4 / cell_size)] = bottom
+    return cells, walls_of(surface), Window(7, -3, count, count)
+
+
+@pytest.mark.parametrize("cell_size", [0.01, 0.005])
+def test_edges_of_walls_break_off_and_nothing_is_lost(cell_size):
+    cells, walls, window = trench(cell_size, "snow")
+    surface, standing = cells.surface, cells.standing
+    nobody = np.zeros(surface.shape, bool)
+    cells.crumble(pieces(window, cell_size, walls.crumbling), nobody)
+    np.testing.assert_allclose(cells.surface, surface, atol=1e-12)  # what broke off has not fallen yet
+    assert cells.loose.sum() == pytest.approx(cells.cut_height, rel=1e-12)
+    fallen = standing - cells.standing
+    assert fallen.min() >= 0.0
+    away = np.abs(window.centres(cell_size)[0] - (window.column * cell_size + 0.3)) - 0.1
+    assert not fallen[:, (away > EDGE + cell_size) | (away < 0)].any(), "only the edges break"
+    assert 0.3 < (fallen[:, (away > 0) & (away < EDGE / 3)] > 0).mean() < 0.7, "in pieces"
+    cells.slide(walls, nobody, (window.row, window.column), 300)
+    floor = np.flatnonzero(away < 0)
+    assert cells.loose[:, floor].sum() > 0.3 * cells.cut_height, "much of it lies on the floor"
+    assert cells.loose.sum() == pytest.approx(cells.cut_height, rel=1e-9)
+
+
+def test_pieces_do_not_depend_on_cells_or_windows():
+    volumes = []
+    for cell_size in (0.01, 0.005):
+        cells, walls, window = trench(cell_size, "snow")
+        window = Window(round(0.07 / cell_size), round(-0.03 / cell_size), window.rows, window.columns)
+        cells.crumble(pieces(window, cell_size, walls.crumbling), np.zeros(cells.loose.shape, bool))
+        volumes.append(cells.cut_height * cell_size**2)
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.1)
+    small, large = Window(4, 5, 10, 12), Window(0, 0, 30, 40)
+    np.testing.assert_array_equal(pieces(large, 0.01, 0.06)[large.slices(small)], pieces(small, 0.01, 0.06))
+
+
+def test_a_body_in_the_ground_holds_the_wall_and_mud_flows():
+    cells, walls, window = trench(0.01, "snow")
+    cells.crumble(pieces(window, 0.01, walls.crumbling), np.ones(cells.loose.shape, bool))
+    assert cells.cut_height == 0.0
+    assert walls_of("mud").crumbling == walls_of("sand").crumbling == 0.0
