@@ -18,12 +18,12 @@ from functools import lru_cache
 from math import ceil, pi, tan
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ..ground.material import GroundMaterial
 from ..ground.sparse_grid import Window
 from ..ground.surfaces import SurfaceRecord
 from ..numerics.arrays import Array, Mask
+from ..numerics.neighbourhood import lowest_within
 from ..pressing.repose import slid
 from ..relief.lattice_noise import noise
 
@@ -42,9 +42,9 @@ THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
 then anywhere."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
-EDGE, LEAST_DROP = 0.03, 0.06
+EDGE, LEAST_DROP = 0.06, 0.06
 """A wall breaks off within such a distance of ground that lies so much lower [m]."""
-PIECES, SEED = (0.05, 0.02), 431
+PIECES, SEED = (0.09, 0.035), 431
 """Sizes of the pieces [m], and the number that their noise begins with."""
 MOST_OF_DROP = 0.7
 """Part of a drop that breaks off at most."""
@@ -234,7 +234,7 @@ class CarvedCells:
         """
         standing = self.standing
         surface = standing + self.loose
-        drops = [standing - _lowest_around(surface, ceil(part * EDGE / self.cell_size)) for part in (1 / 3, 2 / 3, 1)]
+        drops = [standing - lowest_within(surface, ceil(part * EDGE / self.cell_size)) for part in (1 / 3, 2 / 3, 1)]
         near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
         broken = np.minimum(deepest * near, MOST_OF_DROP * np.maximum(drops[-1], 0.0))
         broken[self.closed | self.contact | body] = 0.0
@@ -286,15 +286,6 @@ def pieces(window: Window, cell_size: float, crumbling: float) -> Array:
     x, y = (axis.ravel() for axis in np.meshgrid(*window.centres(cell_size)))
     above = sum((noise(SEED + number, size, x, y) for number, size in enumerate(PIECES)), np.zeros(len(x)))
     return np.asarray(crumbling * np.maximum(above, 0.0)).reshape(window.rows, window.columns)
-
-
-def _lowest_around(heights: Array, reach: int) -> Array:
-    """Lowest height (rows, columns) within so many cells along both axes of each."""
-    for axis in (0, 1):
-        sides = [(reach, reach) if each == axis else (0, 0) for each in (0, 1)]
-        padded = np.pad(heights, sides, constant_values=np.inf)
-        heights = sliding_window_view(padded, 2 * reach + 1, axis=axis).min(axis=-1)
-    return heights
 
 
 def _middle(quarters: Array) -> Array:

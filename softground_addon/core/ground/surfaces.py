@@ -266,7 +266,7 @@ SURFACES = {record.name: record for record in (
         voice=Voice(1.0, 0.25, 0.3, 0.0, (1000, 4000), (0.0015, 0.004), 220.0, 1.5, (1500, 6000), (80, 150)),
         colour=(0.87, 0.90, 0.94), under=(0.12, 0.07, 0.04), shades=(0.92, 1.0), swell=0.50,
         shader="snow", relief="snow", midi_note=36,
-        wall_packing=0.73, wall_cohesion=180.0, wall_crumbling=0.06,
+        wall_packing=0.73, wall_cohesion=180.0, wall_crumbling=0.10,
         drifts_from=0.27, melts=True, control="hand_hardness",
         carried=CarriedFilm("snow", most=0.3, taken=0.2, deposited=0.5, water=1.0),
     ),

@@ -17,6 +17,7 @@ from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
 from .carved_lumps import lumps, lying
+from .carved_walls import room
 from .print_relief import FINEST_CRUMB, relief_of_print
 from .print_shape import SAME
 from .tread import SoleTread
@@ -100,13 +101,14 @@ def relief_of_steps(
     places = Places(x, y)
     standing, water = np.zeros((len(places.x), 2)), np.zeros(len(places.x))
     loose, lumped = lying(footprints) if len(places.x) else None, np.zeros(len(places.x))
+    between = room(footprints, places, blur_sigma) if loose else None
     steps = []
     for footprint in footprints:
         yield
         if loose and not len(footprint.contact_cells):
             step = _carve(footprint, loose, places, lumped, water, wanted)
         else:
-            step = _step(footprint, places, standing, water, wanted, blur_sigma)
+            step = _step(footprint, places, standing, water, wanted, blur_sigma, between)
         steps.append(step.scaled(wanted.strength))
     return steps
 
@@ -118,8 +120,12 @@ def _step(
     water: Array,
     wanted: ReliefSettings,
     blur_sigma: float,
+    between: tuple[Array, Array] | None,
 ) -> StepRelief:
-    """Relief of full strength that a step adds; updates the relief (K, 2) and the water (K,) at all places."""
+    """Relief of full strength that a step adds; updates the relief (K, 2) and the water (K,) at all places.
+
+    The relief stays between two heights (K,), if given.
+    """
     if not len(footprint.contact_cells):
         return NOTHING
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
@@ -143,6 +149,10 @@ def _step(
     relief = of_print.at(places.x[point], places.y[point])
     change = np.stack([relief.height, relief.compression], axis=-1)
     change -= relief.pressed[:, None] * standing[point]
+    if between:
+        height = standing[point, 0] + change[:, 0]
+        beyond = height - np.clip(height, *(end[point] for end in between))
+        change += beyond[:, None] * (-1.0, 1.0)  # what rises less is compressed more
     change = np.round(change / QUANTUM) * QUANTUM
     standing[point] += change
     water[point] = np.maximum(water[point] * (1.0 - relief.pressed), relief.water)

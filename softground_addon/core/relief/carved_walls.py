@@ -1,0 +1,55 @@
+"""Walls of prints where bodies carve: relief moves no wall that a leg has cut away.
+
+The relief of a print bends its walls sideways. Where a leg has carved beside the print, there is no wall any more, and
+what is bent there would stand up as a needle, as high as the print is deep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..ground.display_blur import blurred
+from ..ground.places import Places
+from ..numerics.arrays import Array
+from ..numerics.neighbourhood import lowest_within
+from ..record.footprints import Footprint, recompose
+
+REACH = 0.012
+"""Distance within which relief bends a wall sideways [m]."""
+ROUGHNESS = 0.012
+"""Change of height that needs no wall [m]."""
+
+
+def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> tuple[Array, Array]:
+    """Lowest and highest change of height by relief at places, (K,) and (K,) [m]; infinite where no body carves.
+
+    Carved ground with relief lies between the lowest and the highest ground that is displayed within `REACH`, to
+    `ROUGHNESS`.
+
+    Parameters
+    ----------
+    blur_sigma : float
+        Standard deviation of the display blur [m].
+    """
+    low, high = np.full(len(places.x), -np.inf), np.full(len(places.x), np.inf)
+    carves = [footprint for footprint in footprints if not len(footprint.contact_cells)]
+    if not carves:
+        return low, high
+    ground, size = blurred(recompose(footprints), blur_sigma), carves[0].cell_size
+    reach = int(np.ceil(REACH / size))
+    for carve in carves:
+        window = carve.window.expanded(2 * reach)
+        point = places.within(carve.window.expanded(reach), size)
+        if not len(point):
+            continue
+        compression, rim = ground.read(window)
+        heights = rim - compression
+        x, y = places.x[point], places.y[point]
+        cell = window.cells_under(x, y, size)
+        compression, rim = ground.sample(x, y)
+        here = rim - compression
+        low[point] = lowest_within(heights, reach)[cell] - here - ROUGHNESS
+        high[point] = -lowest_within(-heights, reach)[cell] - here + ROUGHNESS
+    return low, high
