@@ -601,18 +601,91 @@ def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_c
     for take_out in (bpy.ops.softground.remove_ground, options.grounds.clear):
         assert rows_about(CRATE) == []
         take_out()
-        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_bake"]
+        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_unlisted"]
         assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     options.grounds.clear()
     (note,) = [row for row in bake(scene).report["self_check"] if row["code"] == "unlisted_prints"]
     assert "'Crate' keeps the prints of an earlier bake" in note["message"]
     assert bytes_of(prints_on(crate)) == prints
-    assert bpy.ops.softground.clear_bake(object=CRATE) == {"FINISHED"}
+    assert bpy.ops.softground.clear_unlisted(object=CRATE) == {"FINISHED"}
     assert not baked_ground.has_remains(crate)
     assert baked_ground.is_baked(options.ground)
     assert rows_about(CRATE) == []
     bpy.ops.softground.clear_bake()
     assert fingerprints.of_file() == before
+
+
+def test_clear_bake_is_off_where_only_grounds_that_left_the_list_have_prints(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.remove_ground()
+    assert not bpy.ops.softground.clear_unlisted.poll() or bake_report.unlisted(scene.softground) == [crate]
+    assert bpy.ops.softground.clear_bake.poll()
+    bpy.ops.softground.clear_bake()
+    assert baked_ground.is_baked(crate)
+    assert not bpy.ops.softground.clear_bake.poll()
+    assert "no ground 'Nobody'" in refusal(lambda: bpy.ops.softground.clear_unlisted(object="Nobody"))
+    assert bpy.ops.softground.clear_unlisted(object=CRATE) == {"FINISHED"}
+    assert not baked_ground.has_remains(crate)
+    assert not bpy.ops.softground.clear_unlisted.poll()
+
+
+@pytest.mark.parametrize("is_listed", [True, False])
+def test_a_printed_ground_that_is_deleted_is_forgotten_at_once_and_undo_brings_both_back(crate, is_listed):
+    scene, inner = bpy.context.scene, bpy.data.collections.new("Inner")
+    scene.collection.children.link(inner)  # which is what a deletion changes, and not the scene
+    inner.objects.link(crate)
+    scene.collection.objects.unlink(crate)
+    also(crate)
+    bake(scene)
+    if not is_listed:
+        bpy.ops.softground.remove_ground()
+    bpy.ops.ed.undo_push(message="Before")
+    inner.objects.unlink(bpy.data.objects[CRATE])  # it is hidden, as its copy shows the prints
+    bpy.ops.ed.undo_push(message="Delete")
+    bpy.context.view_layer.update()  # after which a window calls the handlers
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
+    bpy.ops.ed.undo()
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field", CRATE]
+    bpy.ops.ed.redo()
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
+
+
+def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_no_sound(crate, tmp_path, monkeypatch):
+    scene, heard = bpy.context.scene, []
+    options, floor = scene.softground, scene.softground.ground
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.remove_ground()
+    options.hard_grounds.add().object = crate
+    report = bake(scene).report
+    bpy.ops.softground.add_ground(object=CRATE)
+    assert baked_ground.is_baked(crate)
+    assert bake_report.baked_grounds(options) == [floor]
+    rows = event_points.events_on(bake_report.baked_grounds(options))
+    assert [(row["frame"], row["contact"], row["phase"]) for row in rows] == [
+        (row["frame"], row["contact"], row["phase"]) for row in report["events"]
+    ]
+    further_grounds.choose(options, options.grounds[0])
+    assert bake_report.baked_grounds(options) == [floor], "whichever is shown"
+    monkeypatch.setattr(sound, "footsteps", lambda steps, *_: heard.extend(steps) or np.zeros((9, 1)))
+    sound_exports.write(scene, tmp_path / "steps.wav", 1, 84)
+    assert len({step.name for step in heard}) == len(heard)
+    bake(scene)
+    assert bake_report.baked_grounds(options) == [crate, floor]
+
+
+def test_bakes_of_other_times_of_the_shot_are_all_heard(crate):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    end, options.frame_end = options.frame_end, 30
+    bake(scene)
+    options.ground, options.frame_start, options.frame_end = crate, 31, end
+    options.hard_grounds.add().object = floor
+    bake(scene)
+    also(floor)
+    assert set(bake_report.baked_grounds(options)) == {crate, floor}
 
 
 def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_it_is_one(crate, tmp_path, monkeypatch):
