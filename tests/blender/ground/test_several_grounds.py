@@ -13,7 +13,8 @@ from softground_addon.blender import further_grounds, ground_presets, jobs, pres
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
-from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.live import live
 from softground_addon.blender.output import event_points, export_formats, sound_exports
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
@@ -337,9 +338,113 @@ def test_the_list_is_shown_where_there_are_several_and_its_buttons_act(crate):
     assert settings.grounds_of(options) == [crate]
 
 
-def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presses_one(crate):
+def shown_on(*grounds):
+    """Heights of what shows the prints of some grounds."""
+    return [as_rendered(baked_ground.display_mesh_of(ground))[:, 2] for ground in grounds]
+
+
+def test_live_mode_presses_all_grounds_as_a_bake_does_and_takes_back_what_it_pressed(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    ground_presets.make_of(scene.softground, further_grounds.own_material(scene.softground, item), FIRM)
+    before = fingerprints.of_file()
+    scene.frame_set(1)
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    undisturbed = shown_on(floor, crate)
+    seen = {}
+    for frame in (84, 40, 1, 84):
+        scene.frame_set(frame)
+        heights = shown_on(floor, crate)
+        assert all(map(np.array_equal, heights, seen.setdefault(frame, heights)))
+    assert all(map(np.array_equal, seen[1], undisturbed))
+    assert [np.ptp(now - then) > 0.005 for now, then in zip(seen[84], undisturbed, strict=True)] == [True, True]
+    assert len(live.in_contact(scene.session_uid)[0]) > 0
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    assert fingerprints.of_file() == before
+    bake(scene)
+    scene.frame_set(84)
+    baked = {ground: (len(record_of(ground).footprints), low) for ground, low in lowest_steps(floor, crate)}
+    bpy.ops.softground.clear_bake()
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    scene.frame_set(84)
+    bpy.ops.softground.live(keep=True)
+    for ground, deepest in lowest_steps(floor, crate):
+        assert (len(record_of(ground).footprints), pytest.approx(deepest, rel=1e-6)) == baked[ground]
+        assert [each["ground"] for each in record_of(ground).about["inputs"]["grounds"]]
+    assert bake_report.baked_grounds(scene.softground) == [floor, crate]
+    assert [item.object for item in scene.softground.printed] == [floor, crate]
+    bpy.ops.softground.clear_bake()
+    scene.frame_set(1)
+    assert fingerprints.of_file() == before
+
+
+FIRM = preset_files.named("mud")
+
+
+def lowest_steps(*grounds):
+    return [(ground, max(step.max_depth_m for step in prints_on(ground))) for ground in grounds]
+
+
+def test_live_mode_presses_a_ground_again_when_its_material_changes_and_leaves_the_others(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    material = further_grounds.own_material(scene.softground, item)
+    scene.frame_set(84)
+    bpy.ops.softground.live()
+    on_floor, on_crate = shown_on(floor, crate)
+    material.youngs_modulus /= 2
+    while live.is_answering():
+        live.answer(0.0)
+    now_on_floor, now_on_crate = shown_on(floor, crate)
+    assert np.array_equal(now_on_floor, on_floor)
+    assert (on_crate - now_on_crate).max() > 0.005
+    assert live.is_on()
+    live.discard()
+    assert not baked_ground.has_remains(crate)
+
+
+def test_live_mode_says_why_it_does_not_follow_where_steps_come_onto_another_ground(crate):
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.05, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(60)
+    bpy.ops.softground.live()
+    before = shown_on(scene.softground.ground, crate)
+    slab.location.y = scene.softground.ground.location.y - 6.0
+    slab.location.z = 0.01 - 0.05
+    bpy.context.view_layer.update()
+    while live.is_answering():
+        live.answer(0.0)
+    assert "Steps are on other grounds by now" in live.refusal()
+    assert all(map(np.array_equal, shown_on(scene.softground.ground, crate), before))
+    slab.location = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    while live.is_answering():
+        live.answer(0.0)
+    assert live.refusal() == ""
+    live.discard()
+
+
+def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(60)
+    bpy.ops.softground.live()
+    assert [ground_mesh.is_baked(baked_ground.display_mesh_of(each)) for each in (crate, slab)] == [True, False]
+    bpy.data.objects.remove(baked_ground.display_mesh_of(crate))
+    scene.frame_set(61)
+    assert not live.is_on()
+    bpy.ops.softground.clear_bake()
+    assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_what_moves_or_is_no_ground_is_refused(crate):
     also(crate)
-    assert "Live mode presses one ground" in refusal(bpy.ops.softground.live)
     crate.keyframe_insert("location", frame=1)
     crate.location.x = 1.0
     crate.keyframe_insert("location", frame=40)
