@@ -110,6 +110,8 @@ _OPERATORS = {
 
 _FIELDS = {"cell size": "cell_size", "set Detail": "detail", "switch Sink Feet off": "sink_feet"}
 """Settings of the scene, by the words for them."""
+_BESIDE_BAKE = "sink_feet"
+"""Setting that the panel has in any case."""
 
 
 def draw_remedies(
@@ -117,7 +119,7 @@ def draw_remedies(
 ) -> None:
     """Show each remedy once, but for those of characters that are named among what has `changed` since the bake.
 
-    Those that the panel of the active character has are not repeated `in_panel`.
+    What the panel has above is not repeated `in_panel`: the mass of the active character, and Sink Feet.
     """
     above = active_character(options) if in_panel else None
     layout.operator_context = "INVOKE_DEFAULT"  # which is another one in a popup
@@ -142,7 +144,7 @@ def draw_remedies(
             if operator == "softground.create_ground":
                 button.use_selected = False
     for words, field in _FIELDS.items():
-        if words in text:
+        if words in text and not (in_panel and field == _BESIDE_BAKE):
             layout.prop(options, field)
 
 

@@ -97,7 +97,9 @@ def test_a_mass_that_is_too_large_is_in_the_panel_once_whichever_character_is_ch
         layout.reset_mock()
         options.active_character = active
         drawn_on(layout.column())
-        bake_result.draw_remedies(layout.column(), options, ["'Walker' is too heavy. Set Mass."], in_panel=True)
+        texts = ["'Walker' is too heavy. Set Mass.", "Feet were not lowered. Or switch Sink Feet off."]
+        bake_result.draw_remedies(layout.column(), options, texts, in_panel=True)
+        assert "sink_feet" not in [call.args[1] for call in layout.column().prop.mock_calls], "it is beside the button"
         owners = [call.args[0] for call in layout.column().prop.mock_calls if call.args[1] == "mass"]
         assert owners == [options.characters[0]] * active
 
