@@ -66,7 +66,12 @@ def _parser() -> argparse.ArgumentParser:
     forces.add_argument("--csv", type=Path, metavar="FILE.csv", help="write all frames as a table")
     forces.add_argument("--opensim", type=Path, metavar="FILE.mot", help="write them as OpenSim reads them")
     forces.add_argument(
-        "--plot", nargs="?", type=Path, const=Path(), metavar="FILE.png", help="draw them; NAME_forces.png by default"
+        "--plot",
+        nargs="?",
+        type=Path,
+        const=Path(),
+        metavar="FILE.png",
+        help="draw them; a new NAME_forces.png beside it by default",
     )
     pressing = commands.add_parser("press", help="prints in a ground", description="Prints of a body in soft ground.")
     pressing.set_defaults(run=_press)
@@ -79,19 +84,26 @@ def _parser() -> argparse.ArgumentParser:
     pressing.add_argument("--csv", type=Path, metavar="FILE.csv", help="write a table of the prints")
     for command in (forces, pressing):
         command.add_argument("file", type=Path, help="motion: .c3d, .trc, .bvh, or AMASS .npz")
-        command.add_argument(
-            "--static", type=Path, metavar="FILE", help="static trial (.c3d, .trc) with further markers"
-        )
         command.add_argument("--mass", type=float, metavar="KG", help="of the body; else as the file or its size says")
         command.add_argument("--level", type=float, default=0.0, metavar="M", help="height of the level ground [m]")
     validating = commands.add_parser("validate", help="forces against force plates", description=validate.__doc__)
     validating.set_defaults(run=_validate)
     validating.add_argument("directory", type=Path, help="folder of C3D files, of TRC and MOT, or of CSV and JSON")
     validating.add_argument("--report", type=Path, metavar="FILE.json", help="write the table as JSON")
+    for command in (forces, pressing, validating):
+        command.add_argument(
+            "--static", type=Path, metavar="FILE", help="static trial (.c3d, .trc) with further markers"
+        )
     return parser
 
 
 def _forces(options: argparse.Namespace) -> None:
+    picture = options.plot
+    if picture is not None and not picture.name:
+        picture = options.file.with_name(f"{options.file.stem}_forces.png")
+        _check_new(picture, f"replace it by --plot {picture}")
+    if options.opensim and options.opensim.suffix.lower() == ".mot" and not options.opensim.exists():
+        _check_new(options.opensim.with_suffix(".xml"), "give --opensim another name")
     loads = _loads(options)
     measured = plates_on_feet(loads.body).force if loads.body.plates else None
     print(f"{'sole':<8} {'from s':>8} {'to s':>8} {'peak N':>8} {'±':>6} {'impulse Ns':>11}")
@@ -109,10 +121,15 @@ def _forces(options: argparse.Namespace) -> None:
         print(to_csv(loads, options.csv))
     for path in to_opensim(loads, options.opensim) if options.opensim else ():
         print(path)
-    if options.plot is not None:
-        path = options.plot if options.plot.name else options.file.with_name(f"{options.file.stem}_forces.png")
-        plot_loads(loads, path, measured)
-        print(path)
+    if picture is not None:
+        plot_loads(loads, picture, measured)
+        print(picture)
+
+
+def _check_new(path: Path, remedy: str) -> None:
+    """Raise InputError if a file exists that would be written without having been named."""
+    if path.exists():
+        raise InputError(f"'{path}' is there already: {remedy}", "file_exists", path=path)
 
 
 def _contact(loads: Loads, sole: SoleLoads, start: float, end: float) -> str:
@@ -151,7 +168,7 @@ def _write_heights(prints: Prints, time: float, path: Path) -> Path:
 
 
 def _validate(options: argparse.Namespace) -> None:
-    trials, show = read_trials(options.directory), _progress()
+    trials, show = read_trials(options.directory, options.static), _progress()
     found = []
     for number, trial in enumerate(trials, start=1):
         scored = [*validate(trial)]

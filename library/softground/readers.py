@@ -146,11 +146,17 @@ def c3d_mass(content: bytes) -> float | None:
 def _marked(path: PathLike, capture: Capture, mass: float | None, up: str | None, static: PathLike | None) -> Body:
     if up is not None and up not in UPWARD:
         raise InputError(f"up is {up!r}: it must be one of {', '.join(UPWARD)}", "unknown_axis", up=up)
+    return _captured(path, body_of_markers(capture, up, static), mass)
+
+
+def body_of_markers(capture: Capture, up: str | None, static: PathLike | None) -> CapturedBody:
+    """The joint centres of a capture, with the markers of a static trial if one is given; parameters and errors are
+    those of `read_c3d`."""
     if static is not None:
         is_trc = Path(static).suffix.lower() == ".trc"
         capture = with_static(capture, (trc if is_trc else c3d).read(content_of(static)))
     try:
-        return _captured(path, captured_body(capture, up), mass)
+        return captured_body(capture, up)
     except InputError as error:
         if error.code != "missing_markers" or static is not None:
             raise

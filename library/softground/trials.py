@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from ._core.capture import c3d, trc
 from ._core.capture.captured import bridged
-from ._core.capture.joint_centres import captured_body
 from ._core.errors import InputError
 from ._core.motion.motion import CharacterMotion
 from .body import Body
 from .markers import SIDES, motion_of_markers
 from .plates import plates_on_feet
-from .readers import c3d_mass, content_of
+from .readers import body_of_markers, c3d_mass, content_of
 from .storage import first_time, forces_beside, plates_of
 
 Array = NDArray[np.float64]
@@ -104,10 +103,11 @@ def _of_table(csv: Path, about: Mapping[str, Any], table: NDArray[Any]) -> Trial
     )
 
 
-def read_marked(path: Path) -> Trial:
+def read_marked(path: Path, static: Path | None = None) -> Trial:
     """The trial in a C3D file with plates, or in a TRC file with a table of forces beside it (`storage.forces_beside`).
 
-    A `NAME.json` beside it with `mass_kg` comes before what the file says of the mass.
+    A `NAME.json` beside it with `mass_kg` comes before what the file says of the mass. A static trial gives the markers
+    that it lacks, as for `readers.read_c3d`.
 
     Raises
     ------
@@ -119,7 +119,8 @@ def read_marked(path: Path) -> Trial:
     mass = _about(about)["mass_kg"] if about.exists() else c3d_mass(content) if is_c3d else None
     if mass is None:
         raise InputError(f'{path} does not say what its subject weighs: write {{"mass_kg": ...}} to {about}', "no_mass")
-    captured = captured_body(c3d.read(content)) if is_c3d else captured_body(trc.read(content), "Y")
+    capture = (c3d if is_c3d else trc).read(content)
+    captured = body_of_markers(capture, None if is_c3d else "Y", static)
     table = None if is_c3d else forces_beside(path)
     plates = plates_of(table, first_time(content)) if table else captured.plates
     body = Body.from_joints(captured.joints, captured.rate, up="Z", mass=mass, name=path.stem, plates=plates)

@@ -85,10 +85,11 @@ class Told:
         )
 
 
-def read_trials(directory: Path) -> list[Trial]:
+def read_trials(directory: Path, static: Path | None = None) -> list[Trial]:
     """The trials of a folder: C3D files, TRC files with forces, or NAME.csv and NAME.json.
 
-    A NAME.bvh beside either is the same motion.
+    A NAME.bvh beside either is the same motion. A static trial of the subject of all files of markers gives those that
+    they lack; it may lie in the folder, and is no trial itself.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def read_trials(directory: Path) -> list[Trial]:
     trials = [read_trial(csv) for csv in sorted(directory.glob("*.csv"))]
     marked = sorted(directory.glob("*.[cC]3[dD]"))
     marked += [file for file in sorted(directory.glob("*.[tT][rR][cC]")) if forces_beside(file)]
-    trials += [read_marked(file) for file in marked]
+    trials += [read_marked(file, static) for file in marked if static is None or file.resolve() != static.resolve()]
     if not trials:
         raise InputError(
             f"{directory} holds no trial: give a folder of C3D files, of TRC files with forces as NAME_grf.mot, or of "

@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
 from . import reuse, session, settings, translation, tread_images
+from .baking import bake_report
 from .carried import marks_object
 from .compat import remove_scene
 from .debris import debris_object
@@ -69,6 +70,7 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
 
 
 def _follow_deletion(scene: Any) -> None:
+    bake_report.forget_deleted(scene.softground)
     for ground in settings.listed_grounds(scene.softground) if not live.is_on() else ():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):

@@ -3,14 +3,15 @@ far from the origin."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.motion.ground_frame import ALIGNED, GroundFrame
+from ..core.motion.ground_frame import ALIGNED, GroundFrame, in_world
 from ..core.numerics.arrays import Array
 from ..core.rig.recording import SceneUnits
 from ..core.settings import DOWN
@@ -113,6 +114,17 @@ def to_world(frame: GroundFrame | None, ground: bpy.types.Object | None) -> Matr
         return Matrix()
     inverse = Matrix(np.linalg.inv(np.array(frame.matrix)).tolist())
     return ground.matrix_world @ inverse if frame.moves and ground else inverse
+
+
+def events_in_world(
+    table: Sequence[Mapping[str, Any]], frame: GroundFrame | None, ground: bpy.types.Object | None, unit_scale: float
+) -> list[dict[str, Any]]:
+    """Rows about a bake, with their places in the world as its ground lies now."""
+    if frame is None:
+        return [dict(row) for row in table]
+    in_metres = np.array(to_world(frame, ground), dtype=np.float64)
+    in_metres[:3, 3] *= unit_scale
+    return in_world(table, in_metres)
 
 
 def hang_on(obj: bpy.types.Object, ground: bpy.types.Object, frame: GroundFrame | None) -> None:

@@ -482,6 +482,16 @@ def test_the_command_tells_forces_presses_and_leaves_with_the_extension_s_codes(
     assert main(["forces"]) == 2
 
 
+def test_a_file_that_nobody_named_is_not_replaced(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("library.softground.cli._loads", lambda _: pytest.fail("it is refused before the work"))
+    motion, mine = str(tmp_path / "walk.c3d"), b"mine"
+    for name, options in (("walk_forces.png", ["--plot"]), ("walk.xml", ["--opensim", str(tmp_path / "walk.mot")])):
+        (tmp_path / name).write_bytes(mine)
+        assert main(["forces", motion, *options]) == 2
+        assert f"{name}' is there already" in capsys.readouterr().err
+        assert (tmp_path / name).read_bytes() == mine
+
+
 def test_a_check_that_fails_and_an_interruption_have_codes_of_their_own(tmp_path, capsys, monkeypatch):
     for error, code in ((softground.BakeError("broken"), 3), (KeyboardInterrupt(), 130)):
 

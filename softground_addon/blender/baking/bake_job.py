@@ -37,6 +37,7 @@ from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.baked_ground import EVENTS
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
+from ..placement import events_in_world
 from ..reading import staleness
 from ..reading.shots import Shot, read_shot, settings_of
 from ..remedies import worded
@@ -164,7 +165,7 @@ def bake(
     )
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):
-        result[table] = baked_ground.events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
+        result[table] = events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
     for each, made_with, moved in zip(published, asked.of_each_ground, movers, strict=False):
         if each:
             sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])

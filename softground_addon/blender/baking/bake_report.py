@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from ...core.composers.responses import floating_mm
+from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
 from ...core.record.footprints import Footprint
+from ...core.record.record import load_edits
 from ...core.record.typical_depth import typical_of
 from ...core.settings import BakeSettings
 from .. import settings
@@ -30,9 +34,46 @@ LAST_FRAME = "last_frame"
 
 
 def baked_grounds(options: Any) -> list[bpy.types.Object]:
-    """Grounds of a scene with a bake; the first, where none has any."""
+    """Grounds of a scene with a bake, without those whose steps a later bake has; the first, where none has any."""
     grounds = settings.grounds_of(options)
-    return [ground for ground in grounds if baked_ground.is_baked(ground)] or grounds[:1]
+    baked = [ground for ground in grounds if baked_ground.is_baked(ground)]
+    shots = [_shot_on(ground) for ground in baked]
+    return [
+        ground
+        for at, ground in enumerate(baked)
+        if not any(shots[at].is_before(shot, is_listed_first=other < at) for other, shot in enumerate(shots))
+    ] or grounds[:1]
+
+
+@dataclass(frozen=True)
+class _BakedShot:
+    """What a bake on a ground was of: that ground and all of the shot by name, its characters, its frames."""
+
+    ground: str = ""
+    grounds: frozenset[str] = frozenset()
+    characters: frozenset[str] = frozenset()
+    frames: tuple[int, int] = (0, 0)
+
+    def is_before(self, other: _BakedShot, *, is_listed_first: bool) -> bool:
+        """True if another bake has the steps of this one, and is later, or listed first where nothing tells.
+
+        Each bake writes all grounds of its shot: what it was about and has not written was written since.
+        """
+        (start, end), (first, last) = self.frames, other.frames
+        if self.grounds == other.grounds or not self.characters & other.characters or last < start or end < first:
+            return False
+        knows, is_known = other.ground in self.grounds, self.ground in other.grounds
+        return knows if knows != is_known else is_listed_first
+
+
+def _shot_on(ground: bpy.types.Object) -> _BakedShot:
+    """The shot of the bake on a ground; one without characters where the record is damaged."""
+    with suppress(InputError, KeyError, TypeError, ValueError, OverflowError):
+        inputs = load_edits(bytes(baked_ground.stored_record(ground)))[0]["inputs"]
+        grounds = [str(each["ground"]) for each in (inputs, *inputs.get("grounds", ()))]
+        characters = frozenset(str(character["name"]) for character in inputs["characters"])
+        return _BakedShot(grounds[0], frozenset(grounds), characters, baked_ground.frames_of(inputs))
+    return _BakedShot()
 
 
 def note_prints(options: Any) -> None:
@@ -42,6 +83,13 @@ def note_prints(options: Any) -> None:
     for ground in dict.fromkeys(filter(settings.exists, known)):
         if baked_ground.has_remains(ground):
             options.printed.add().object = ground
+
+
+def forget_deleted(options: Any) -> None:
+    """Take grounds that were deleted out of what `note_prints` noted, or the file would hold their prints for ever."""
+    for number in reversed(range(len(options.printed))):
+        if not settings.exists(options.printed[number].object):
+            options.printed.remove(number)
 
 
 def unlisted(options: Any) -> list[bpy.types.Object]:

@@ -191,7 +191,8 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     factor = scale_to_metres(size, captured=is_captured(character))
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
-    put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3
+    empty = put_under(scene, armature, "Scale")
+    empty.scale = empty.scale * factor
     is_typed = not isclose(character.mass, mass_of(character), rel_tol=1e-6)
     character.size, character.sole_length = character.size * factor, character.sole_length * factor
     character.skin_mass = float(f"{character.skin_mass * factor**3:.2g}")

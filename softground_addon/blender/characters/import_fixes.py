@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
@@ -50,22 +51,32 @@ def _heads(armature: bpy.types.Object) -> NDArray[np.float64]:
     return heads.astype(float)
 
 
-def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> bpy.types.Object:
-    """Hang a character, with the meshes that it deforms, on a new empty at the origin; whatever animates it stays.
+PUT_UNDER = "softground_empty"
+"""Custom property of an empty above a character: what it is for."""
+
+
+def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, purpose: str) -> bpy.types.Object:
+    """Hang a character, with the meshes that it deforms, on an empty at the origin; whatever animates it stays.
+
+    It is the one that was made for this purpose before, wherever the user has put that since, or else a new one.
 
     Raises
     ------
     InputError
         If it is linked from another file.
     """
+    before = next((obj for obj in ancestors(armature) if obj.get(PUT_UNDER) == purpose), None)
     tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene.objects, armature)))
-    linked = next((obj for obj in tops if obj.library), None)
+    linked = next((obj for obj in ([before] if before else tops) if obj.library), None)
     if linked is not None:
         raise InputError(
             f"'{linked.name}' is linked from another file: make a library override of it (Object > Library Override > "
             "Make), or scale it in its own file."
         )
-    empty = bpy.data.objects.new(name, None)
+    if before:
+        return before
+    empty = bpy.data.objects.new(f"{armature.name} {purpose}", None)
+    empty[PUT_UNDER] = purpose
     (armature.users_collection or (scene.collection,))[0].objects.link(empty)
     for obj in tops:
         obj.parent = empty
@@ -76,20 +87,36 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
 def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDArray[np.float64]) -> None:
     """Let a character that walks on the spot travel at a velocity (2,) [m/s], also beyond the frames of the bake.
 
+    A character that was let travel before goes on as it does, and so much faster.
+
     Raises
     ------
     InputError
         If it is linked from another file.
     """
-    empty = put_under(scene, armature, f"{armature.name} Travel")
-    start, end = scene.softground.frame_start, scene.softground.frame_end
-    seconds = (end - start) / frame_rate_of(scene)
-    for frame, travel in ((start, np.zeros(2)), (end, velocity * seconds / scene.unit_settings.scale_length)):
-        empty.location[:2] = travel
-        empty.keyframe_insert("location", frame=frame * time_stretch_of(scene))
-    assert empty.animation_data is not None
-    assert empty.animation_data.action is not None
-    for curve in action_curves(empty.animation_data.action):
-        curve.extrapolation = "LINEAR"
+    empty, options, stretch = put_under(scene, armature, "Travel"), scene.softground, time_stretch_of(scene)
+    if not _travels(empty):
+        for frame in (options.frame_start, options.frame_end):
+            empty.keyframe_insert("location", frame=frame * stretch)
+        for curve in _travels(empty):
+            curve.extrapolation = "LINEAR"
+            for key in curve.keyframe_points:
+                key.interpolation = "LINEAR"
+    above = empty.parent.matrix_world @ empty.matrix_parent_inverse if empty.parent else Matrix()
+    per_second = np.linalg.pinv(np.array(above)[:3, :3])[:, :2] @ velocity / scene.unit_settings.scale_length
+    for curve in _travels(empty):
+        slope = per_second[curve.array_index] / (frame_rate_of(scene) * stretch)
         for key in curve.keyframe_points:
-            key.interpolation = "LINEAR"
+            for point in (key.handle_left, key.handle_right, key.co):
+                point.y += slope * (point.x - options.frame_start * stretch)
+        curve.update()
+        curve.id_data.update_tag()
+
+
+def _travels(empty: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Curves of the place of an empty."""
+    animation = empty.animation_data
+    if not (animation and animation.action):
+        return []
+    curves = action_curves(animation.action, getattr(animation, "action_slot", None))
+    return [curve for curve in curves if curve.data_path == "location"]

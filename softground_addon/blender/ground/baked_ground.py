@@ -14,7 +14,7 @@ from ...batch.manifest_values import FRAME_LIMIT
 from ...core.errors import InputError
 from ...core.events.events import Event, as_edited
 from ...core.ground.material import MATERIAL_RANGES, OFF
-from ...core.motion.ground_frame import GroundFrame, in_world, rows
+from ...core.motion.ground_frame import GroundFrame, rows
 from ...core.numerics.arrays import Array, Indices
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
@@ -25,7 +25,7 @@ from ...core.settings import ObjectName
 from ..carried import marks_object
 from ..debris import debris_object
 from ..jobs import Job, Progress
-from ..placement import to_world
+from ..placement import events_in_world
 from ..plants import trampling_table
 from ..playback import own_data, playback
 from ..settings import SceneUnits, exists, name_of, resolve
@@ -282,24 +282,19 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
         If there is no bake, or its record has no events.
     """
     bake_record = record_of(ground)
+    inputs = bake_record.about["inputs"]
+    return events_in_world(events_in_frame(ground, bake_record), frame_in(inputs), ground, inputs["unit_scale_m"])
+
+
+def events_in_frame(ground: bpy.types.Object, bake_record: record.BakeRecord) -> list[Event]:
+    """The same in the frame of the bake, as its record on the ground has its steps."""
     table = bake_record.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    inputs, rows = bake_record.about["inputs"], as_edited(table, bake_record.steps, bake_record.laid_carves)
+    rows = as_edited(table, bake_record.steps, bake_record.laid_carves)
     if (marks := marks_object.of(ground)) is not None and marks_object.has_numbers(marks):
         rows = marks_object.floors_of(marks).with_films(rows, bake_record.steps)
-    return events_in_world(rows, frame_in(inputs), ground, inputs["unit_scale_m"])
-
-
-def events_in_world(
-    table: Sequence[Mapping[str, Any]], frame: GroundFrame | None, ground: bpy.types.Object | None, unit_scale: float
-) -> list[dict[str, Any]]:
-    """Rows about a bake, with their places in the world as its ground lies now."""
-    if frame is None:
-        return [dict(row) for row in table]
-    in_metres = np.array(to_world(frame, ground), dtype=np.float64)
-    in_metres[:3, 3] *= unit_scale
-    return in_world(table, in_metres)
+    return rows
 
 
 def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:

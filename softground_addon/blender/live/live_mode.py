@@ -1,4 +1,4 @@
-"""A ground that follows the timeline and the settings of its scene.
+"""Grounds that follow the timeline and the settings of their scene.
 
 Blender does not report changes of settings: they are compared. After a change the shot is pressed again, a little at a
 time and the newest steps first.
@@ -18,21 +18,25 @@ from numpy.typing import NDArray
 
 from ...core.carving.carved_step import is_deep
 from ...core.composers.playhead import Playhead, footprints_of
+from ...core.composers.pressed_shot import shares_of
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.errors import InputError
 from ...core.ground.sparse_grid import Window
 from ...core.loads.cell_limits import check_cell_size
+from ...core.loads.estimate import CharacterLoads
 from ...core.record import record
+from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround
-from ...core.settings import Acts, BakeSettings
+from ...core.settings import Acts, BakeSettings, ObjectName
 from .. import jobs, settings
 from ..baking import bake_report
-from ..baking.publish import at_the_end, publish, sign, with_debris
+from ..baking.publish import Published, at_the_end, publish, sign, until_ready, with_debris
 from ..ground import baked_ground, ground_surface
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of
 from ..remedies import said
-from .live_ground import LiveGround
+from ..translation import translated
+from .live_part import LivePart, touched
 
 Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
 """Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
@@ -43,7 +47,7 @@ PART = 0.025
 
 
 class LiveMode:
-    """A scene whose ground follows its timeline.
+    """A scene whose grounds follow its timeline.
 
     Parameters
     ----------
@@ -51,8 +55,8 @@ class LiveMode:
         With its ground.
     known : analysis.Analysis
         Of its shot.
-    ground : LiveGround
-        Shows `playhead`.
+    parts : sequence of LivePart
+        The grounds that soles touch, or the first.
     """
 
     def __init__(
@@ -60,54 +64,44 @@ class LiveMode:
         scene: bpy.types.Scene,
         wanted: BakeSettings,
         known: analysis.Analysis,
-        ground: LiveGround,
-        playhead: Playhead,
+        parts: Sequence[LivePart],
     ) -> None:
         assert wanted.ground is not None
         self.scene = scene.session_uid
         self.rendering = False
         self.answered_at = 0.0  # on the clock of `time.perf_counter`
-        self._refused: tuple[BakeSettings, str] | None = None
+        self._refused: tuple[BakeSettings, analysis.Analysis, str] | None = None
         self._answering: Generator[None] | None = None
         self._asked: BakeSettings | None = None
         self._can_start_over = True
-        self._drawn_over: list[Window] = []
-        self._owner, self._ground = wanted.ground, ground
-        self._analysis, self._wanted, self._playhead = known, wanted, playhead
+        self._parts = tuple(parts)
+        self._analysis, self._wanted = known, wanted
 
     def follow(self, scene: bpy.types.Scene) -> bool:
-        """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
-        ground = self._object(scene)
-        if ground is None:
+        """Show the grounds at the scene's frame; False if one is gone or was changed by somebody else."""
+        shown = self._objects(scene)
+        if shown is None:
             return False
         if bpy.app.background:  # where there are no timers, and nobody waits
             with suppress(InputError):  # the last reading stays shown
                 self.answer(scene)
-        before = self._playhead.frame
-        windows = self._playhead.go_to(float(scene.frame_current))
-        if self._playhead.frame != before:
-            self._show(ground, windows)
+        for part, obj in zip(self._parts, shown, strict=True):
+            part.go_to(obj, float(scene.frame_current), self._wanted)
         return True
 
-    def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
-        """Show changes in some windows, and wherever something else was shown in the meantime."""
-        wanted, windows = self._wanted, [*windows, *self._drawn_over]
-        self._ground.show(ground, self._playhead, windows, wanted.material.blur_sigma, wanted.frame_rate)
-        self._drawn_over = []
-
-    def _object(self, scene: bpy.types.Scene | None) -> bpy.types.Object | None:
-        ground = scene.softground.ground if scene else None
-        return self._ground.object(ground and baked_ground.display_mesh_of(ground))
+    def _objects(self, scene: bpy.types.Scene | None) -> list[bpy.types.Object] | None:
+        """What shows the prints of each part; None if any of them is gone."""
+        shown = [obj for obj in (part.object(scene) for part in self._parts) if obj is not None]
+        return shown if len(shown) == len(self._parts) else None
 
     def show_anew(self, scene: bpy.types.Scene) -> bool:
-        """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
-        ground = self._object(scene)
-        if ground is None:
+        """Show the grounds at the scene's frame whatever the meshes show at the moment, as after an undo."""
+        shown = self._objects(scene)
+        if shown is None:
             return False
-        self._ground.take_from(ground)
         self._answering, self._can_start_over = None, True
-        self._playhead.go_to(float(scene.frame_current))
-        self._show(ground, self._playhead.ground.tile_windows())
+        for part, obj in zip(self._parts, shown, strict=True):
+            part.show_anew(obj, float(scene.frame_current), self._wanted)
         return True
 
     def answer(self, scene: bpy.types.Scene, seconds: float = np.inf) -> bool:
@@ -154,7 +148,7 @@ class LiveMode:
         """True if settings or animation differ from those that are being pressed, or were last."""
         if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
             return False  # another ground wants another live mode
-        if self.refusal(asked):
+        if self._refused and self.refusal(asked) and analysis.known(scene, asked) is self._refused[1]:
             return False
         if self._answering is None and analysis.known(scene, asked) is not self._analysis:
             return True
@@ -168,7 +162,7 @@ class LiveMode:
 
     def refusal(self, asked: BakeSettings) -> str:
         """Reason why settings are not pressed; empty if they are, or were not tried."""
-        return self._refused[1] if self._refused is not None and self._refused[0] == asked else ""
+        return self._refused[2] if self._refused is not None and self._refused[0] == asked else ""
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
         """Press the shot up to the frame that is shown: the newest steps onto the present ground, then all of them."""
@@ -180,45 +174,48 @@ class LiveMode:
         try:
             check_cell_size(known.loads, asked.fineness, asked.longest_bake_s)
         except InputError as error:  # the last ground stays shown
-            self._refused = asked, said(error)
+            self._refused = asked, known, said(error)
             return
-        whole = self._playhead
+        wholes = [part.playhead for part in self._parts]
         if not self._presses_like(known, asked):
-            if self._playhead.ground.cell_size == asked.cell_size_m:
-                yield from self._pressing_newest(known, asked)
+            shares = yield from shares_of(asked, known.shot.motions, known.loads, known.shot.terrain)
+            if fault := self._not_shown(shares):
+                self._refused = asked, known, fault
+                return
+            if self._parts[0].playhead.ground.cell_size == asked.cell_size_m:
+                for part in self._parts:
+                    yield from part.pressing_newest(self.current_scene(), asked, known.shot, shares[part.number])
             self._can_start_over = True
-            undisturbed = self._playhead.undisturbed
-            looked_up = known.shot is self._analysis.shot and undisturbed.cell_size == asked.cell_size_m
-            whole = Playhead(
-                known.loads,
-                ground_of(asked, known.shot),
-                asked.cell_size_m,
-                undisturbed=undisturbed if looked_up else None,
-            )
-            while whole.advance(self._frame()):
-                yield
-            whole.go_to(self._frame())
-        windows = [*self._playhead.ground.tile_windows(), *whole.ground.tile_windows()]
-        if whole.ground.cell_size != self._playhead.ground.cell_size:
-            self._ground.forget_cells()
-        self._playhead, self._analysis, self._wanted = whole, known, asked
-        if shown_on := self._object(self.current_scene()):
-            self._show(shown_on, windows)
+            wholes = [self._begun(part, known, asked, shares[part.number]) for part in self._parts]
+            for whole in wholes:
+                while whole.advance(self._frame()):
+                    yield
+            for whole in wholes:
+                whole.go_to(self._frame())
+        self._analysis, self._wanted, self._refused = known, asked, None
+        for part, whole in zip(self._parts, wholes, strict=True):
+            part.take_over(whole, part.object(self.current_scene()), asked)
 
-    def _pressing_newest(self, known: analysis.Analysis, asked: BakeSettings) -> Generator[None]:
-        """Show the newest steps as they will be; nothing where they are most of the shot."""
-        since, shown = self._playhead.before_newest(), self._playhead.frame
-        if since - self._playhead.first_frame < shown - since:
-            return
-        newest = self._playhead.pressed_anew(since, known.loads, ground_of(asked, known.shot))
-        while newest.advance(shown):
-            yield
-        if ground := self._object(self.current_scene()):
-            changed = [*self._playhead.changed_since(since), *newest.changed_since(since)]
-            windows = [*changed, *self._drawn_over]
-            self._ground.show(ground, newest, windows, asked.material.blur_sigma, asked.frame_rate)
-            self._drawn_over = changed
-            yield
+    def _not_shown(self, shares: Sequence[Sequence[CharacterLoads]]) -> str:
+        """Reason if soles touch a ground that does not follow the timeline, or there are fewer grounds than before."""
+        followed = {part.number for part in self._parts}
+        others = {number for number, loads in enumerate(shares) if touched(loads)} - followed
+        if not others and max(followed) < len(shares):
+            return ""
+        return translated("Steps are on other grounds by now: end live mode, and start it again")
+
+    def _begun(
+        self, part: LivePart, known: analysis.Analysis, asked: BakeSettings, loads: Sequence[CharacterLoads]
+    ) -> Playhead:
+        """A simulation of a part by other settings, at its beginning."""
+        undisturbed = part.playhead.undisturbed
+        looked_up = known.shot is self._analysis.shot and undisturbed.cell_size == asked.cell_size_m
+        return Playhead(
+            loads,
+            ground_of(asked.of_each_ground[part.number], known.shot.of_each_ground[part.number]),
+            asked.cell_size_m,
+            undisturbed=undisturbed if looked_up else None,
+        )
 
     def _presses_like(self, known: analysis.Analysis, asked: BakeSettings) -> bool:
         """True if the ground that is shown need not be pressed again."""
@@ -236,38 +233,70 @@ class LiveMode:
 
     def in_contact(self) -> Contact:
         """See `in_contact` of this module."""
-        return self._playhead.in_contact(), self._playhead.ground.cell_size, self._wanted.material.rim_reach
+        touching = [contact for part in self._parts for contact in part.playhead.in_contact()]
+        return touching, self._parts[0].playhead.ground.cell_size, self._wanted.material.rim_reach
 
     def keeping(self, scene: bpy.types.Scene) -> jobs.Job[None]:
-        """Keep the ground as shown: as the bake of the frames up to now, with the settings that pressed them."""
+        """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them."""
         now = jobs.Progress("simulate", 0.0)
         with suppress(InputError):  # then the last ground is kept
             if self.has_more(scene):
                 yield from analysis.reading(scene)
             while self.answer(scene, PART):
                 yield now
-        ground = self._object(scene)
-        if ground is None:
+        shown = self._objects(scene)
+        if shown is None:
             return
-        playhead, loads, shot = self._playhead, self._playhead.loads_by_now(), self._analysis.shot
-        asked = settings.snapshot(scene)
+        names, shot = [settings.name_of(obj) for obj in shown], self._analysis.shot
+        made_with = self._kept_with(settings.snapshot(scene))
+        of_each = [made_with.of_each_ground[part.number] for part in self._parts]
+        movers = [staleness.of_movers(scene.objects, each) for each in of_each]
+        pressed = []
+        for part in self._parts:
+            loads = part.playhead.loads_by_now()
+            pressed.append((yield from jobs.meanwhile(now, footprints_of.slices(part.playhead, loads))))
+        bodies = {motion.name for motion in shot.motions if motion.joints}
+        deep = any(is_deep(each) for prints in pressed for each in prints if each.character in bodies)
+        if made_with.carves and deep:
+            of_each = [replace(each, carve=False) for each in of_each]  # live mode carves nothing
+        yield now
+        writing: list[tuple[jobs.Job[Published], Sequence[Footprint]] | None] = []
+        for part, name, each, footprints in zip(self._parts, names, of_each, pressed, strict=True):
+            if footprints or len(self._parts) == 1:
+                writing.append((yield from self._writing(part, name, each, footprints)))
+            else:
+                writing.append(None)
+        for waiting in filter(None, writing):
+            yield from until_ready(waiting[0])
+        for part, job, each, moved in zip(self._parts, writing, of_each, movers, strict=True):
+            if job is None:  # no step is on it by now
+                part.discard()
+                continue
+            published = (yield from job[0]) if len(writing) == 1 else jobs.run(job[0])
+            sign(published, each, moved, summary=bake_report.summary_of_prints(job[1]))
+        bake_report.note_prints(scene.softground)
+
+    def _kept_with(self, asked: BakeSettings) -> BakeSettings:
+        """Settings of the bake that is kept, with the present ones of what does not press."""
         made_with = replace(
             self._wanted,
-            frames=(self._wanted.frames[0], int(playhead.frame)),
+            frames=(self._wanted.frames[0], int(self._parts[0].playhead.frame)),
             shape_keys=asked.shape_keys,
             dense_shape_keys=asked.dense_shape_keys,
             tread_m=asked.tread_m,
             debris=asked.debris,
             weather=None,  # which live mode does not follow
+            grounds=tuple(replace(each, weather=None) for each in self._wanted.grounds),
         )
         with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
-            made_with = with_shoe_treads(made_with, shot.motions)
-        movers, name = staleness.of_movers(scene.objects, made_with), settings.name_of(ground)
-        footprints = yield from jobs.meanwhile(now, footprints_of.slices(playhead, loads))
-        bodies = {motion.name for motion in shot.motions if motion.joints}
-        if made_with.carves and any(is_deep(print) for print in footprints if print.character in bodies):
-            made_with = replace(made_with, carve=False)  # live mode carves nothing
-        yield now
+            made_with = with_shoe_treads(made_with, self._analysis.shot.motions)
+        return made_with
+
+    def _writing(
+        self, part: LivePart, name: ObjectName, made_with: BakeSettings, footprints: list[Footprint]
+    ) -> jobs.Job[tuple[jobs.Job[Published], Sequence[Footprint]]]:
+        """The job that publishes the prints of a part on the object of a name, and these."""
+        now, shot = jobs.Progress("simulate", 0.0), self._analysis.shot.of_each_ground[part.number]
         vertices = ground_surface.rest_vertices(settings.resolve(name), made_with.unit_scale_m, made_with.frame)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
         shown = yield from jobs.meanwhile(now, pressing)
@@ -275,17 +304,15 @@ class LiveMode:
         index = yield from jobs.meanwhile(now, looking)
         place = baked_ground.on_itself(settings.resolve(name), index, vertices)
         baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
+        loads = part.playhead.loads_by_now()
         throwing = with_debris.slices(baked, ground_of(made_with, shot), made_with, loads)
         baked, debris = yield from jobs.meanwhile(now, throwing)
-        published = yield from publish(baked, debris, place, made_with)
-        sign(published, made_with, movers, summary=bake_report.summary_of_prints(baked.footprints))
-        bake_report.note_prints(scene.softground)
+        return publish(baked, debris, place, made_with), baked.footprints
 
     def discard(self) -> None:
-        """Leave the ground as it was before."""
-        ground = settings.find(self._owner) or self._ground.object(None)
-        if ground is not None:
-            baked_ground.clear(ground)
+        """Leave the grounds as they were before."""
+        for part in self._parts:
+            part.discard()
 
 
 _ENDED = object()

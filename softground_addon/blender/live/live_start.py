@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
-from ...core.errors import InputError
+from ...core.composers.pressed_shot import shares_of
 from ...core.loads.cell_limits import check_cell_size
+from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
 from ...core.numerics.arrays import Array, Mask
@@ -26,12 +28,13 @@ from ..reading import analysis
 from ..reading.shots import Shot, ground_of, settings_of
 from .live_ground import LiveGround
 from .live_mode import LiveMode
+from .live_part import LivePart, touched
 
 PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
 
 
 def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
-    """A scene whose ground follows its timeline from now on. Nothing that the user sees changes before the last step.
+    """A scene whose grounds follow its timeline from now on. Nothing that the user sees changes before the last step.
 
     Raises
     ------
@@ -39,27 +42,49 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         If the scene could not be baked either.
     """
     wanted = settings_of(scene)
-    if wanted.grounds:
-        raise InputError("Live mode presses one ground: bake, or take the others out of the list in Ground.")
     known = yield from analysis.reading(scene)
     check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
-    playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
+    sharing = shares_of(wanted, known.shot.motions, known.loads, known.shot.terrain)
+    shares = yield from meanwhile(PLACING, sharing)
+    numbers = [number for number, loads in enumerate(shares) if touched(loads)] or [0]
+    shots = [replace(part, motions=known.shot.motions) for part in known.shot.of_each_ground]
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
-        place = yield from _place(drafts, scene, wanted, known.shot)
-        yield PRESSING
-        ground = LiveGround(place, wanted.unit_scale_m, wanted.frame)
-        frame = float(scene.frame_current)
-        while playhead.advance(frame):
-            yield PRESSING
-        sigma, windows = wanted.material.blur_sigma, playhead.ground.tile_windows()
-        yield from meanwhile(PRESSING, ground.updating(playhead, windows, sigma))
+        ready = []
+        for number in numbers:
+            of_ground = wanted.of_each_ground[number], shots[number], shares[number]
+            ready.append((yield from _ready(drafts, scene, *of_ground)))
         yield PRESSING
         with analysis.own_changes(scene):
-            shown = ground.put_on(place, wanted.unit_scale_m, wanted.frame)
-            ground.show(shown, playhead, (), sigma, wanted.frame_rate)
+            shown = [_put_on(*each, made_with=wanted.of_each_ground[n]) for n, each in zip(numbers, ready, strict=True)]
     if wanted.ground is None:
-        wanted, known = replace(wanted, ground=settings.name_of(shown)), analysis.read(scene)
-    return LiveMode(scene, wanted, known, ground, playhead)
+        wanted, known = replace(wanted, ground=settings.name_of(shown[0])), analysis.read(scene)
+    owners = wanted.soft_grounds
+    parts = [LivePart(n, owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
+    return LiveMode(scene, wanted, known, parts)
+
+
+def _ready(
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
+) -> Job[tuple[baked_ground.Place, LiveGround, Playhead]]:
+    """A ground, pressed up to the frame that is shown, before its scene has it."""
+    place = yield from _place(drafts, scene, wanted, shot)
+    yield PRESSING
+    ground = LiveGround(place, wanted.unit_scale_m, wanted.frame)
+    playhead, frame = Playhead(loads, ground_of(wanted, shot), wanted.cell_size_m), float(scene.frame_current)
+    while playhead.advance(frame):
+        yield PRESSING
+    windows = playhead.ground.tile_windows()
+    yield from meanwhile(PRESSING, ground.updating(playhead, windows, wanted.material.blur_sigma))
+    return place, ground, playhead
+
+
+def _put_on(
+    place: baked_ground.Place, ground: LiveGround, playhead: Playhead, *, made_with: BakeSettings
+) -> bpy.types.Object:
+    """Show a ground in its scene; what shows it."""
+    shown = ground.put_on(place, made_with.unit_scale_m, made_with.frame)
+    ground.show(shown, playhead, (), made_with.material.blur_sigma, made_with.frame_rate)
+    return shown
 
 
 def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> Job[baked_ground.Place]:

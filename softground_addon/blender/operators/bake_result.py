@@ -16,6 +16,7 @@ from ..characters.character_setup import title_of
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
 from ..translation import translated
+from .character_editing import active_character
 
 
 def draw(layout: Any, options: Any, summary: Any) -> None:
@@ -23,7 +24,7 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
     _result(layout, summary)
     warnings = ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground))
     _warnings(layout, warnings)
-    draw_remedies(layout.column(align=True), options, warnings, session.current().stale)
+    draw_remedies(layout.column(align=True), options, warnings, session.current().stale, in_panel=True)
     _floating_feet(layout, options, summary)
 
 
@@ -109,10 +110,18 @@ _OPERATORS = {
 
 _FIELDS = {"cell size": "cell_size", "set Detail": "detail", "switch Sink Feet off": "sink_feet"}
 """Settings of the scene, by the words for them."""
+_BESIDE_BAKE = "sink_feet"
+"""Setting that the panel has in any case."""
 
 
-def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: str = "") -> None:
-    """Show each remedy once, but for those of characters that are named among what has `changed` since the bake."""
+def draw_remedies(
+    layout: Any, options: Any, warnings: Sequence[str], changed: str = "", *, in_panel: bool = False
+) -> None:
+    """Show each remedy once, but for those of characters that are named among what has `changed` since the bake.
+
+    What the panel has above is not repeated `in_panel`: the mass of the active character, and Sink Feet.
+    """
+    above = active_character(options) if in_panel else None
     layout.operator_context = "INVOKE_DEFAULT"  # which is another one in a popup
     for character in options.characters:
         name = f"'{title_of(character)}'"
@@ -120,7 +129,7 @@ def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: s
         for words, operator in _OF_CHARACTER.items():
             if match := re.search(words, text):
                 layout.operator(operator, text=_button(match), translate=False).character = title_of(character)
-        if "Set Mass" in text:
+        if "Set Mass" in text and character != above:
             layout.prop(character, "mass")
     text = "\n".join(warnings)
     listed = {item.object.name for item in (*options.hard_grounds, *options.grounds) if item.object}
@@ -135,7 +144,7 @@ def draw_remedies(layout: Any, options: Any, warnings: Sequence[str], changed: s
             if operator == "softground.create_ground":
                 button.use_selected = False
     for words, field in _FIELDS.items():
-        if words in text:
+        if words in text and not (in_panel and field == _BESIDE_BAKE):
             layout.prop(options, field)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
@@ -88,11 +91,6 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     bl_label = "Clear Bake"
     bl_options = {"REGISTER", "UNDO"}
 
-    object: StringProperty(
-        name="Ground",
-        description="Name of a ground that has prints and is not in the list any more; all that are in it if empty",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
     only_shown: BoolProperty(
         name="Only the Ground Shown",
         description="Of several grounds, leave the others and the response as they are",
@@ -101,34 +99,21 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        scene = settings.scene_of(context)
-        grounds = [*settings.listed_grounds(scene.softground), *bake_report.unlisted(scene.softground)]
-        if not any(map(baked_ground.has_remains, grounds)) and not response_job.has_layers(scene.softground):
+        options = settings.options_of(context)
+        is_printed = any(map(baked_ground.has_remains, settings.listed_grounds(options)))
+        if not is_printed and not response_job.has_layers(options):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
-        if session.current().is_live:
-            cls.poll_message_set(translated("Live mode is on: press Keep or Discard first"))
-            return False
-        return True
+        return _may_clear(cls)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         grounds = settings.listed_grounds(scene.softground)
-        cleared = grounds[:1] if self.only_shown else grounds
-        if self.object:
-            cleared = [obj for obj in bake_report.unlisted(scene.softground) if obj.name == self.object]
-        for ground in filter(baked_ground.has_remains, cleared):  # all of them, or none
-            baked_ground.check_writable(ground)
-        reuse.forget()
+        _clear(scene, grounds[:1] if self.only_shown else grounds)
+        if self.only_shown and grounds[1:]:
+            return {"FINISHED"}
         with analysis.own_changes(scene):
-            for ground in cleared:
-                if baked_ground.has_remains(ground):
-                    baked_ground.clear(ground)
-                look.take_off(ground)
-            bake_report.note_prints(scene.softground)
-            if self.object or (self.only_shown and grounds[1:]):
-                return {"FINISHED"}
             response_job.remove_layers(scene, LayerKind.RESPONSE)
         response_job.remove_layers(scene, LayerKind.CLEAN_FEET)  # which the shot was read with
         if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on
@@ -136,9 +121,60 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_clear_unlisted(bpy.types.Operator):
+    """Remove the footprints from a ground that is not in the list any more, as if there had been no bake on it"""
+
+    bl_idname = "softground.clear_unlisted"
+    bl_label = "Clear Prints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    object: StringProperty(
+        name="Object", description="Name of the ground; all that have left the list if empty", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not bake_report.unlisted(settings.options_of(context)):
+            cls.poll_message_set(translated("No ground that left the list has prints"))
+            return False
+        return _may_clear(cls)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        grounds = bake_report.unlisted(scene.softground)
+        chosen = [obj for obj in grounds if self.object in ("", obj.name)]
+        if not chosen:
+            raise InputError(f"There is no ground '{self.object}' with prints outside the list.")
+        _clear(scene, chosen)
+        return {"FINISHED"}
+
+
+def _may_clear(operator: Any) -> bool:
+    """True unless live mode is on, which an operator then says."""
+    if session.current().is_live:
+        operator.poll_message_set(translated("Live mode is on: press Keep or Discard first"))
+        return False
+    return True
+
+
+def _clear(scene: bpy.types.Scene, grounds: Sequence[bpy.types.Object]) -> None:
+    """Take the prints off some grounds, or off none where one of them cannot be changed (InputError)."""
+    for ground in filter(baked_ground.has_remains, grounds):
+        baked_ground.check_writable(ground)
+    reuse.forget()
+    with analysis.own_changes(scene):
+        for ground in grounds:
+            if baked_ground.has_remains(ground):
+                baked_ground.clear(ground)
+            look.take_off(ground)
+        bake_report.note_prints(scene.softground)
+
+
 CLASSES = (
     SOFTGROUND_OT_add_ground,
     SOFTGROUND_OT_remove_ground,
     SOFTGROUND_OT_choose_ground,
     SOFTGROUND_OT_clear_bake,
+    SOFTGROUND_OT_clear_unlisted,
 )

@@ -57,9 +57,11 @@ def write(
 
 
 def _steps_on(ground: bpy.types.Object, rate: float, start: int) -> list[SoundStep]:
-    """Sounding steps of the bake on a ground, as `sound.steps_of` has them."""
-    footprints = {step.name: step.footprint for step in baked_ground.steps_of(ground) if step.footprint}
-    return sound.steps_of(footprints, baked_ground.events_of(ground), frame_rate=rate, first_frame=start)
+    """Sounding steps of the bake on a ground, as `sound.steps_of` has them, in the frame of that bake."""
+    record = baked_ground.record_of(ground)
+    footprints = {step.name: step.footprint for step in record.steps if step.footprint}
+    table = baked_ground.events_in_frame(ground, record)
+    return sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
 
 
 def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:

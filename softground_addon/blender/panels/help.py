@@ -46,6 +46,7 @@ PAGES = (
     ("bpy.types.softgroundpainted.*", "ground.html#masks"),
     ("bpy.ops.softground.choose_ground", "ground.html#several-ground-objects"),
     ("bpy.ops.softground.add_ground", "ground.html#several-ground-objects"),
+    ("bpy.ops.softground.clear_unlisted", "ground.html#several-ground-objects"),
     ("bpy.ops.softground.remove_ground", "ground.html#several-ground-objects"),
     ("bpy.types.softgroundfurtherground.*", "ground.html#several-ground-objects"),
     ("bpy.ops.softground.*hard_ground", "ground.html#hard-ground"),

@@ -249,7 +249,7 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
             row = layout.row(align=True)
             row.label(text=translated("'{name}' keeps its prints", name=ground.name), icon="INFO", translate=False)
             row.operator("softground.add_ground", text="", icon="ADD").object = ground.name
-            row.operator("softground.clear_bake", text="", icon="TRASH").object = ground.name
+            row.operator("softground.clear_unlisted", text="", icon="TRASH").object = ground.name
         row = layout.row(align=True)
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isclose
 from typing import Any
 
 import bpy
@@ -81,12 +82,18 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
     preset: EnumProperty(
         name="Preset",
         items=[
-            ("AS_ANIMATED", "As Animated", "Arms and trunk move as they are animated"),
+            (
+                "AS_ANIMATED",
+                "As Animated",
+                "Sets Lift Knees, Hold Feet, Bend Knees and Arms Out to 0 and switches Tilt off. After Wading, gives "
+                "back Tilt's Strength and the scene's time",
+            ),
             (
                 "WADING",
                 "Wading",
-                "Arms are held out and the body sways for balance. After a bake, time is stretched to the speed at "
-                "which people would walk on this ground",
+                "Holds the arms out and lets the body sway: sets Arms Out to 0.5, Tilt on with a Strength of 0.1, and "
+                "Lift Knees, Hold Feet and Bend Knees to 0. After a bake with Sink Feet or Grounding, stretches the "
+                "scene's time to the Suggested Speed",
             ),
         ],
     )
@@ -98,15 +105,32 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
             setattr(options.grounding, part, 0.0)
         options.grounding.arms, options.tilt.use = WADING_ARMS * wades, wades
         if wades:
-            options.tilt.strength = WADING_TILT
+            _lend(options.tilt, WADING_TILT)
         else:
-            options.tilt.property_unset("strength")
+            _give_back(options.tilt, WADING_TILT)
         character = active_character(options)
         if wades and character and character.armature and has_layer(character.armature):
             settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
         elif (scene.render.frame_map_old, scene.render.frame_map_new) == tuple(options.slowed_time):
             settings.slow_down(scene, 1.0)
         return {"FINISHED"}
+
+
+def _lend(tilt: Any, strength: float) -> None:
+    """Set the strength of Tilt, and note the user's own."""
+    if tilt.own_strength < 0.0:
+        tilt.own_strength = tilt.strength
+    tilt.strength = strength
+
+
+def _give_back(tilt: Any, lent: float) -> None:
+    """Set the strength of Tilt to the user's own again, unless it was changed since; nothing where none was lent."""
+    default = tilt.bl_rna.properties["strength"].default
+    if tilt.own_strength >= 0.0 and isclose(tilt.strength, lent, rel_tol=1e-6):
+        tilt.strength = tilt.own_strength
+        if tilt.strength == default:
+            tilt.property_unset("strength")
+    tilt.property_unset("own_strength")
 
 
 class SOFTGROUND_OT_show_frame(bpy.types.Operator):

@@ -67,9 +67,10 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         options = settings.options_of(context)
         layout.prop(options, "steps_feel_weather")
         if not options.steps_feel_weather:
-            note = layout.column()
+            note = layout.column(align=True)
             note.active = False
-            note.label(text="Weather only covers the prints", icon="INFO")
+            note.label(text="Steps are pressed as without weather", icon="INFO")
+            note.label(text="Tick the box above, and bake again", icon="BLANK1")
 
 
 CLASSES = (SOFTGROUND_MT_weather, SOFTGROUND_PT_weather)

@@ -39,6 +39,13 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
     strength: share(
         "Strength", "How far the body leans into a slope: at 1, by the full angle of the ground", default=0.5, most=2.0
     )
+    own_strength: FloatProperty(
+        name="Own Strength",
+        description="Strength before the preset Wading; -1 without it",
+        default=-1.0,
+        min=-1.0,
+        options={"HIDDEN"},
+    )
     lateral: share("Sideways", "How much of that lean also applies to slopes across its path", default=1.0)
 
 

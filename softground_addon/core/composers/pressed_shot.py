@@ -100,7 +100,7 @@ def press_shot(
         If the cells are too small for the shot.
     """
     asked = wanted.response
-    shares = yield from _shares(wanted, standing, loads, terrain)
+    shares = yield from shares_of(wanted, standing, loads, terrain)
     if wanted.carves:
         for of_ground in zip(wanted.of_each_ground, shares, grounds, strict=True):
             yield from _check_carving(*of_ground)
@@ -115,17 +115,17 @@ def press_shot(
         known = list(zip(before.motions if before else standing, loads, strict=True))
         before = now
         loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
-        shares = yield from _shares(wanted, now.motions, loads, terrain)
+        shares = yield from shares_of(wanted, now.motions, loads, terrain)
         footprints, forces = yield from _pressed(wanted, shares, grounds)
     records = yield from _edited(wanted, grounds, footprints, edits)
     responses = yield from responses_of.slices(loads, motions, terrain, records, asked)
     return PressedShot(loads, shares, records, forces, responses)
 
 
-def _shares(
+def shares_of(
     wanted: BakeSettings, motions: Sequence[CharacterMotion], loads: list[CharacterLoads], terrain: Terrain
 ) -> Slices[list[list[CharacterLoads]]]:
-    """What of the loads each ground bears: all of it, if it is the only one."""
+    """What of the loads each ground bears, as `wanted.of_each_ground` has them: all of it, if it is the only one."""
     several = soft_ground(terrain)
     if not isinstance(several, SeveralGrounds):
         return [loads]

@@ -39,7 +39,8 @@ SAME_LAYER = 1e-3
 
 @sliced
 def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
-    """The plane of a mesh that is a level rectangle along the axes without a hole; None of any other.
+    """The plane of a mesh that is a level rectangle along the axes without a hole; None of any other,
+    and where a vertex is not finite.
 
     Every edge that is not on its sides has as many triangles to its right as to its left: so as many of them cover one
     place as any other, and they do not turn over.
@@ -51,7 +52,9 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
     triangles : (T, 3) int array
         Corners of each triangle.
     """
-    if not 0 < len(triangles) <= MOST_OF_PLANE or np.ptp(vertices[:, 2]) > 0:
+    if not 0 < len(triangles) <= MOST_OF_PLANE or not np.isfinite(vertices).all():
+        return None
+    if (vertices[:, 2] != vertices[0, 2]).any():
         return None
     place = vertices[:, :2]
     low, high = place.min(axis=0), place.max(axis=0)

@@ -4,12 +4,16 @@ import bpy
 import numpy as np
 import pytest
 
+from sample_scenes.body import Body
+from sample_scenes.gait import Gait, walk
 from softground_addon.blender.characters.import_fixes import size_of, stature_of
 from softground_addon.blender.compat import action_curves
+from softground_addon.blender.reading import analysis
 from softground_addon.core.motion.units import scale_to_metres
 from tests.blender import shots
 from tests.blender.baking.test_self_check import codes
 from tests.blender.grounds import bake
+from tests.blender.response.test_root_motion import FRAMES, on_the_spot, speed_of
 from tests.tiers import slow_but_one
 
 
@@ -76,6 +80,44 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     with pytest.raises(RuntimeError, match="its scale needs no fix"):
         bpy.ops.softground.fix_scale()
     bpy.data.objects.remove(armature.parent)
+
+
+def test_the_scale_of_a_character_is_on_one_empty_however_often_it_is_put_right(scene):
+    armature = shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    for factor in (100.0, 0.01):
+        armature.scale = armature.scale * factor
+        bpy.context.view_layer.update()
+        bpy.ops.softground.fix_scale()
+        bpy.context.view_layer.update()
+        assert stature_of(1.0, armature) == pytest.approx(1.7, abs=0.3)
+        assert (armature.parent.name, armature.parent.parent) == ("Walker Scale", None)
+
+
+@pytest.mark.parametrize("turned", [0.0, 2.0])
+def test_walk_ahead_a_second_time_acts_on_the_empty_of_the_first(scene, turned):
+    armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
+    bpy.ops.softground.walk_ahead()
+    empty = armature.parent
+    with pytest.raises(RuntimeError, match="'Walker' does not walk on the spot"):
+        bpy.ops.softground.walk_ahead()
+    for curve in action_curves(empty.animation_data.action):
+        for key in curve.keyframe_points:
+            key.co.y *= 0.0
+        curve.update()
+        curve.id_data.update_tag()
+    if turned:
+        deck = empty.parent = bpy.data.objects.new("Deck", None)
+        scene.collection.objects.link(deck)
+        deck.rotation_euler.z, deck.scale = turned, (0.5,) * 3
+        armature.rotation_euler.z, armature.scale = -turned, (2.0,) * 3
+    bpy.context.view_layer.update()
+    bpy.ops.softground.walk_ahead()
+    assert armature.parent == empty
+    assert empty.parent == (bpy.data.objects["Deck"] if turned else None)
+    bpy.context.view_layer.update()
+    assert "Walker" not in analysis.read(scene).belts
+    assert speed_of(scene, armature) == pytest.approx(Gait().speed, rel=0.03)
 
 
 @pytest.mark.slow

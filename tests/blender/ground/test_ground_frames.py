@@ -7,16 +7,23 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
+from sample_scenes import stage
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
+from softground_addon.blender.characters.prop_setup import add_props
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.live import live
+from softground_addon.blender.output import sound_exports
+from softground_addon.blender.placement import in_scene
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
 from softground_addon.blender.viewport import overlay
 from softground_addon.core.errors import InputError
+from softground_addon.core.events.events import LANDINGS
 from softground_addon.core.record.edits import StepEdit
+from tests.blender.baking.test_props import ball, dropped_path, key_path
+from tests.blender.ground.test_hard_ground import box
 from tests.blender.grounds import as_rendered, bake, field
 
 MAP = (548000.0, 5932000.0, 0.0)
@@ -210,6 +217,58 @@ def test_steps_on_a_crate_that_rides_along_stand_on_it(short_walk):
     crate.parent = None
     with pytest.raises(InputError, match="'Cube' in Hard Ground stands still while 'Place' moves the ground"):
         bake(short_walk)
+
+
+@pytest.mark.parametrize("where", ["sails", "on_a_map"])
+def test_hard_steps_are_heard_from_where_they_are_in_the_world(short_walk, tmp_path, monkeypatch, where):
+    deck(short_walk, keyed=sailing if where == "sails" else ())
+    crate = box(short_walk, "Crate", 0.004, y=(-1.1, -0.5), x=(-0.5, 0.5), bottom=-0.1)
+    crate.parent = bpy.data.objects["Place"]
+    stage.add_camera(short_walk, "Ear", 50.0)
+    short_walk.camera = bpy.data.objects["Ear"]
+    if where != "sails":
+        moved(short_walk, WHERE[where])
+    bpy.context.view_layer.update()
+    short_walk.softground.hard_grounds.add().object = crate
+    bake(short_walk)
+    ground, seen = short_walk.softground.ground, []
+    monkeypatch.setattr(sound_exports, "in_scene", lambda *args: seen.append(in_scene(*args)) or seen[-1])
+    sound_exports.write(short_walk, tmp_path / "steps.wav", 1, 30, stereo=True)
+    landings = [row for row in baked_ground.events_of(ground) if row["phase"] in LANDINGS]
+    assert "hard" in {row["surface"] for row in landings}
+    for row in (row for row in landings if row["surface"] == "hard"):
+        short_walk.frame_set(int(row["frame"]))
+        there = [other["position"] for other in baked_ground.events_of(ground) if other["frame"] == row["frame"]]
+        apart = np.linalg.norm(np.array(seen)[:, None] - np.array(there), axis=2).min()
+        assert apart < (1e-3 if where == "sails" else 1.0), "single precision"
+
+
+def props_on(scene, keyed):
+    """Depth and force of a ball that drops on a deck and a crate that is set down on it, both of 50 kg."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    drop, crate = ball(), box(scene, "Crate", 0.25, x=(0.75, 1.25), y=(-0.25, 0.25), bottom=-0.25)
+    key_path(drop, dropped_path(0.0, 0.0, 0.5, frames=48))
+    key_path(crate, [(0.0, 0.0, 0.25 + max(0.0, 0.4 - 0.04 * frame)) for frame in range(48)])
+    add_props(scene, [drop, crate])
+    for character in scene.softground.characters:
+        character.mass = 50
+    scene.softground.frame_end = 48
+    deck(scene, keyed=keyed)
+    scene.softground.detail = "ALWAYS"
+    steps = {step["character"]: step for step in bake(scene).report["steps"]}
+    return {name: (step["max_depth_m"], step["compressed_m3"], step["peak_force_n"]) for name, step in steps.items()}
+
+
+def test_props_on_a_deck_that_sails_press_as_on_still_ground_and_weigh_more_on_a_lift(scene):
+    before = props_on(scene, ())
+    assert before.keys() == {"Ball", "Crate"}
+    for keyed in (still, sailing):
+        assert all(props_on(scene, keyed)[name] == pytest.approx(each, rel=1e-6) for name, each in before.items())
+    lifted = props_on(scene, rising)
+    for name, (depth, _, force) in before.items():
+        assert lifted[name][0] > depth
+        assert lifted[name][2] - force == pytest.approx(50 * 2.0, rel=0.01)
 
 
 def test_a_crate_on_a_bone_that_moves_beside_the_deck_is_refused(short_walk):

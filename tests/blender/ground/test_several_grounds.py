@@ -13,7 +13,8 @@ from softground_addon.blender import further_grounds, ground_presets, jobs, pres
 from softground_addon.blender.baking import bake_job, bake_report, clean_feet, step_edits
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
-from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.live import live
 from softground_addon.blender.output import event_points, export_formats, sound_exports
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
@@ -337,9 +338,113 @@ def test_the_list_is_shown_where_there_are_several_and_its_buttons_act(crate):
     assert settings.grounds_of(options) == [crate]
 
 
-def test_what_moves_or_is_no_ground_is_refused_and_live_mode_says_that_it_presses_one(crate):
+def shown_on(*grounds):
+    """Heights of what shows the prints of some grounds."""
+    return [as_rendered(baked_ground.display_mesh_of(ground))[:, 2] for ground in grounds]
+
+
+def test_live_mode_presses_all_grounds_as_a_bake_does_and_takes_back_what_it_pressed(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    ground_presets.make_of(scene.softground, further_grounds.own_material(scene.softground, item), FIRM)
+    before = fingerprints.of_file()
+    scene.frame_set(1)
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    undisturbed = shown_on(floor, crate)
+    seen = {}
+    for frame in (84, 40, 1, 84):
+        scene.frame_set(frame)
+        heights = shown_on(floor, crate)
+        assert all(map(np.array_equal, heights, seen.setdefault(frame, heights)))
+    assert all(map(np.array_equal, seen[1], undisturbed))
+    assert [np.ptp(now - then) > 0.005 for now, then in zip(seen[84], undisturbed, strict=True)] == [True, True]
+    assert len(live.in_contact(scene.session_uid)[0]) > 0
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    assert fingerprints.of_file() == before
+    bake(scene)
+    scene.frame_set(84)
+    baked = {ground: (len(record_of(ground).footprints), low) for ground, low in lowest_steps(floor, crate)}
+    bpy.ops.softground.clear_bake()
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    scene.frame_set(84)
+    bpy.ops.softground.live(keep=True)
+    for ground, deepest in lowest_steps(floor, crate):
+        assert (len(record_of(ground).footprints), pytest.approx(deepest, rel=1e-6)) == baked[ground]
+        assert [each["ground"] for each in record_of(ground).about["inputs"]["grounds"]]
+    assert bake_report.baked_grounds(scene.softground) == [floor, crate]
+    assert [item.object for item in scene.softground.printed] == [floor, crate]
+    bpy.ops.softground.clear_bake()
+    scene.frame_set(1)
+    assert fingerprints.of_file() == before
+
+
+FIRM = preset_files.named("mud")
+
+
+def lowest_steps(*grounds):
+    return [(ground, max(step.max_depth_m for step in prints_on(ground))) for ground in grounds]
+
+
+def test_live_mode_presses_a_ground_again_when_its_material_changes_and_leaves_the_others(crate):
+    scene = bpy.context.scene
+    item, floor = also(crate), scene.softground.ground
+    material = further_grounds.own_material(scene.softground, item)
+    scene.frame_set(84)
+    bpy.ops.softground.live()
+    on_floor, on_crate = shown_on(floor, crate)
+    material.youngs_modulus /= 2
+    while live.is_answering():
+        live.answer(0.0)
+    now_on_floor, now_on_crate = shown_on(floor, crate)
+    assert np.array_equal(now_on_floor, on_floor)
+    assert (on_crate - now_on_crate).max() > 0.005
+    assert live.is_on()
+    live.discard()
+    assert not baked_ground.has_remains(crate)
+
+
+def test_live_mode_says_why_it_does_not_follow_where_steps_come_onto_another_ground(crate):
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.05, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(60)
+    bpy.ops.softground.live()
+    before = shown_on(scene.softground.ground, crate)
+    slab.location.y = scene.softground.ground.location.y - 6.0
+    slab.location.z = 0.01 - 0.05
+    bpy.context.view_layer.update()
+    while live.is_answering():
+        live.answer(0.0)
+    assert "Steps are on other grounds by now" in live.refusal()
+    assert all(map(np.array_equal, shown_on(scene.softground.ground, crate), before))
+    slab.location = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    while live.is_answering():
+        live.answer(0.0)
+    assert live.refusal() == ""
+    live.discard()
+
+
+def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(60)
+    bpy.ops.softground.live()
+    assert [ground_mesh.is_baked(baked_ground.display_mesh_of(each)) for each in (crate, slab)] == [True, False]
+    bpy.data.objects.remove(baked_ground.display_mesh_of(crate))
+    scene.frame_set(61)
+    assert not live.is_on()
+    bpy.ops.softground.clear_bake()
+    assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_what_moves_or_is_no_ground_is_refused(crate):
     also(crate)
-    assert "Live mode presses one ground" in refusal(bpy.ops.softground.live)
     crate.keyframe_insert("location", frame=1)
     crate.location.x = 1.0
     crate.keyframe_insert("location", frame=40)
@@ -601,18 +706,91 @@ def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_c
     for take_out in (bpy.ops.softground.remove_ground, options.grounds.clear):
         assert rows_about(CRATE) == []
         take_out()
-        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_bake"]
+        assert rows_about(CRATE) == ["softground.add_ground", "softground.clear_unlisted"]
         assert bpy.ops.softground.add_ground(object=CRATE) == {"FINISHED"}
     options.grounds.clear()
     (note,) = [row for row in bake(scene).report["self_check"] if row["code"] == "unlisted_prints"]
     assert "'Crate' keeps the prints of an earlier bake" in note["message"]
     assert bytes_of(prints_on(crate)) == prints
-    assert bpy.ops.softground.clear_bake(object=CRATE) == {"FINISHED"}
+    assert bpy.ops.softground.clear_unlisted(object=CRATE) == {"FINISHED"}
     assert not baked_ground.has_remains(crate)
     assert baked_ground.is_baked(options.ground)
     assert rows_about(CRATE) == []
     bpy.ops.softground.clear_bake()
     assert fingerprints.of_file() == before
+
+
+def test_clear_bake_is_off_where_only_grounds_that_left_the_list_have_prints(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.remove_ground()
+    assert not bpy.ops.softground.clear_unlisted.poll() or bake_report.unlisted(scene.softground) == [crate]
+    assert bpy.ops.softground.clear_bake.poll()
+    bpy.ops.softground.clear_bake()
+    assert baked_ground.is_baked(crate)
+    assert not bpy.ops.softground.clear_bake.poll()
+    assert "no ground 'Nobody'" in refusal(lambda: bpy.ops.softground.clear_unlisted(object="Nobody"))
+    assert bpy.ops.softground.clear_unlisted(object=CRATE) == {"FINISHED"}
+    assert not baked_ground.has_remains(crate)
+    assert not bpy.ops.softground.clear_unlisted.poll()
+
+
+@pytest.mark.parametrize("is_listed", [True, False])
+def test_a_printed_ground_that_is_deleted_is_forgotten_at_once_and_undo_brings_both_back(crate, is_listed):
+    scene, inner = bpy.context.scene, bpy.data.collections.new("Inner")
+    scene.collection.children.link(inner)  # which is what a deletion changes, and not the scene
+    inner.objects.link(crate)
+    scene.collection.objects.unlink(crate)
+    also(crate)
+    bake(scene)
+    if not is_listed:
+        bpy.ops.softground.remove_ground()
+    bpy.ops.ed.undo_push(message="Before")
+    inner.objects.unlink(bpy.data.objects[CRATE])  # it is hidden, as its copy shows the prints
+    bpy.ops.ed.undo_push(message="Delete")
+    bpy.context.view_layer.update()  # after which a window calls the handlers
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
+    bpy.ops.ed.undo()
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field", CRATE]
+    bpy.ops.ed.redo()
+    assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
+
+
+def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_no_sound(crate, tmp_path, monkeypatch):
+    scene, heard = bpy.context.scene, []
+    options, floor = scene.softground, scene.softground.ground
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.remove_ground()
+    options.hard_grounds.add().object = crate
+    report = bake(scene).report
+    bpy.ops.softground.add_ground(object=CRATE)
+    assert baked_ground.is_baked(crate)
+    assert bake_report.baked_grounds(options) == [floor]
+    rows = event_points.events_on(bake_report.baked_grounds(options))
+    assert [(row["frame"], row["contact"], row["phase"]) for row in rows] == [
+        (row["frame"], row["contact"], row["phase"]) for row in report["events"]
+    ]
+    further_grounds.choose(options, options.grounds[0])
+    assert bake_report.baked_grounds(options) == [floor], "whichever is shown"
+    monkeypatch.setattr(sound, "footsteps", lambda steps, *_: heard.extend(steps) or np.zeros((9, 1)))
+    sound_exports.write(scene, tmp_path / "steps.wav", 1, 84)
+    assert len({step.name for step in heard}) == len(heard)
+    bake(scene)
+    assert bake_report.baked_grounds(options) == [crate, floor]
+
+
+def test_bakes_of_other_times_of_the_shot_are_all_heard(crate):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    end, options.frame_end = options.frame_end, 30
+    bake(scene)
+    options.ground, options.frame_start, options.frame_end = crate, 31, end
+    options.hard_grounds.add().object = floor
+    bake(scene)
+    also(floor)
+    assert set(bake_report.baked_grounds(options)) == {crate, floor}
 
 
 def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_it_is_one(crate, tmp_path, monkeypatch):

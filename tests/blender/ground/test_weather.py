@@ -680,7 +680,7 @@ def test_the_panel_says_that_weather_only_covers_prints_where_there_is_some(open
     panel = MagicMock()
     for has_weather in (False, True):
         weather_panel.SOFTGROUND_PT_weather.draw(panel, bpy.context)
-        assert ("Weather only covers the prints" in str(panel.mock_calls)) == has_weather
+        assert ("Tick the box above, and bake again" in str(panel.mock_calls)) == has_weather
         assert ("steps_feel_weather" in str(panel.mock_calls)) == has_weather
         bpy.ops.softground.add_weather()
 

@@ -17,6 +17,8 @@ from tests.blender.response.test_root_motion import FRAMES, on_the_spot
 from tests.blender.shots import walker
 
 NAMED = ["softground.walk_ahead", "mass", "cell_size"]
+IN_PANEL = ["softground.walk_ahead", "cell_size"]
+"""The mass of the character that is chosen is in the panel above."""
 
 
 def drawn_on(layout):
@@ -55,14 +57,14 @@ def test_the_remedies_that_a_warning_names_are_in_it_and_in_the_panel(wrong):
     assert sorted(drawn) == sorted(NAMED)
     assert popup.layout.column().operator_context == "INVOKE_DEFAULT"  # a popup has another one
     drawn = in_panel(wrong)
-    assert list(drawn) == NAMED
+    assert list(drawn) == IN_PANEL
     assert (drawn[NAMED[0]].text, drawn[NAMED[0]].character) == ("Walk Ahead", "Walker")
 
 
 def test_remedies_stay_in_the_panel_while_their_finding_stands(wrong):
     state = bpy.context.window_manager.softground
     state.stale = "The settings have changed"
-    assert list(in_panel(wrong)) == NAMED
+    assert list(in_panel(wrong)) == IN_PANEL
     bpy.ops.softground.walk_ahead(character="Walker")
     state.stale = "\n".join(bake_result.bake_report.stale_reasons(wrong))
     assert "softground.walk_ahead" not in in_panel(wrong)
@@ -81,11 +83,25 @@ def test_undo_brings_remedies_back_with_their_finding(wrong):
     assert "softground.walk_ahead" not in in_panel(wrong)
     bpy.ops.softground.clear_bake()
     bpy.ops.ed.undo_push(message="Clear Bake")
-    for named in (NAMED[2:], NAMED):  # first, the character has changed since the bake
+    for named in (IN_PANEL[1:], IN_PANEL):  # first, the character has changed since the bake
         bpy.ops.ed.undo()
         outdated.compare_bake()
         assert analysis.known(bpy.context.scene) is None
         assert list(in_panel(bpy.context.scene)) == named
+
+
+def test_a_mass_that_is_too_large_is_in_the_panel_once_whichever_character_is_chosen(wrong):
+    layout, options = MagicMock(), wrong.softground
+    options.characters.add().name = "Other"
+    for active in (0, 1):
+        layout.reset_mock()
+        options.active_character = active
+        drawn_on(layout.column())
+        texts = ["'Walker' is too heavy. Set Mass.", "Feet were not lowered. Or switch Sink Feet off."]
+        bake_result.draw_remedies(layout.column(), options, texts, in_panel=True)
+        assert "sink_feet" not in [call.args[1] for call in layout.column().prop.mock_calls], "it is beside the button"
+        owners = [call.args[0] for call in layout.column().prop.mock_calls if call.args[1] == "mass"]
+        assert owners == [options.characters[0]] * active
 
 
 def test_a_remedy_is_for_the_character_that_its_warning_names(scene):

@@ -36,6 +36,7 @@ NO_INPUT = {
     "characters.clean_feet_strength": "how much of a layer shows, which counts as the rig's movement",
     "characters.response_strength": "how much of a baked layer shows; moves the layer itself",
     "animated_frames": "why the panel says that Start and End are what they are",
+    "tilt.own_strength": "what As Animated gives back",
     "own_time": "what Slow Down gives back",
     "slowed_time": "what Slow Down has set",
 }

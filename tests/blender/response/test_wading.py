@@ -69,6 +69,27 @@ def test_hips_hardly_bounce_knees_straighten_and_nothing_moves_too_fast(
     assert max(side["p95"] for side in report["gaps_mm"]["after"][armature.name].values()) < 2.0
 
 
+def test_as_animated_gives_back_the_strength_of_tilt_from_before_wading(scene):
+    options = scene.softground
+    preset = bpy.ops.softground.response_preset
+    options.tilt.strength = 0.8
+    preset(preset="AS_ANIMATED")
+    assert options.tilt.strength == pytest.approx(0.8), "it was not Wading that set it"
+    for _ in range(2):
+        preset(preset="WADING")
+        assert options.tilt.strength == pytest.approx(0.1)
+    preset(preset="AS_ANIMATED")
+    assert options.tilt.strength == pytest.approx(0.8)
+    preset(preset="WADING")
+    options.tilt.strength = 0.3
+    preset(preset="AS_ANIMATED")
+    assert options.tilt.strength == pytest.approx(0.3), "which was set since"
+    options.tilt.property_unset("strength")
+    preset(preset="WADING")
+    preset(preset="AS_ANIMATED")
+    assert not options.tilt.is_property_set("strength")
+
+
 def test_the_preset_wading_acts_with_arms_trunk_and_speed_and_can_be_taken_back(scene):
     shots.walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()

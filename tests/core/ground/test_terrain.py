@@ -187,6 +187,9 @@ def test_a_level_rectangle_is_the_plane_that_it_shows():
             np.concatenate([AROUND, np.where(AROUND < 4, AROUND, AROUND + 4)]),
         ),
         (SQUARE + np.array([(0, 0, 0)] * 4 + [(0, 0, 1e-6)]), FANS),
+        *((np.where(at, np.nan, SQUARE), FANS) for at in np.eye(15, dtype=bool).reshape(15, 5, 3)),
+        (SQUARE * (1.0, 1.0, np.nan), FANS),
+        (SQUARE * (1.0, 1.0, np.inf), FANS),
         (SQUARE @ [[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], FANS),
     ],
 )

@@ -1,0 +1,104 @@
+"""One of the grounds of live mode, with the simulation that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.composers.playhead import Playhead
+from ...core.ground.sparse_grid import Window
+from ...core.loads.estimate import CharacterLoads
+from ...core.settings import BakeSettings, ObjectName
+from .. import settings
+from ..ground import baked_ground
+from ..reading.shots import Shot, ground_of
+from .live_ground import LiveGround
+
+
+@dataclass
+class LivePart:
+    """A ground that follows the timeline.
+
+    Attributes
+    ----------
+    number : int
+        Of the ground among all of the shot.
+    owner : ObjectName
+        The ground, which may be shown by a copy along the trail.
+    ground : LiveGround
+        Shows `playhead`.
+    drawn_over : list of Window
+        Where something else is shown at the moment.
+    """
+
+    number: int
+    owner: ObjectName
+    ground: LiveGround
+    playhead: Playhead
+    drawn_over: list[Window] = field(default_factory=list)
+
+    def object(self, scene: bpy.types.Scene | None) -> bpy.types.Object | None:
+        """What shows the prints; None if it is gone or no longer as live mode made it."""
+        listed = settings.listed_grounds(scene.softground) if scene else []
+        ground = listed[self.number] if self.number < len(listed) else None
+        return self.ground.object(ground and baked_ground.display_mesh_of(ground))
+
+    def go_to(self, obj: bpy.types.Object, frame: float, wanted: BakeSettings) -> None:
+        """Show the ground on its object at a scene frame."""
+        before = self.playhead.frame
+        windows = self.playhead.go_to(frame)
+        if self.playhead.frame != before:
+            self.show(obj, windows, wanted)
+
+    def show(self, obj: bpy.types.Object, windows: Sequence[Window], wanted: BakeSettings) -> None:
+        """Show changes in some windows, and wherever something else was shown in the meantime."""
+        sigma = wanted.of_each_ground[self.number].material.blur_sigma
+        self.ground.show(obj, self.playhead, [*windows, *self.drawn_over], sigma, wanted.frame_rate)
+        self.drawn_over = []
+
+    def show_anew(self, obj: bpy.types.Object, frame: float, wanted: BakeSettings) -> None:
+        """Show the ground at a scene frame whatever the mesh shows at the moment."""
+        self.ground.take_from(obj)
+        self.playhead.go_to(frame)
+        self.show(obj, self.playhead.ground.tile_windows(), wanted)
+
+    def pressing_newest(
+        self, scene: bpy.types.Scene | None, asked: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
+    ) -> Generator[None]:
+        """Show the newest steps as they will be; nothing where they are most of the shot."""
+        since, shown = self.playhead.before_newest(), self.playhead.frame
+        if since - self.playhead.first_frame < shown - since:
+            return
+        made_with, part = asked.of_each_ground[self.number], shot.of_each_ground[self.number]
+        newest = self.playhead.pressed_anew(since, loads, ground_of(made_with, part))
+        while newest.advance(shown):
+            yield
+        if obj := self.object(scene):
+            changed = [*self.playhead.changed_since(since), *newest.changed_since(since)]
+            sigma = made_with.material.blur_sigma
+            self.ground.show(obj, newest, [*changed, *self.drawn_over], sigma, asked.frame_rate)
+            self.drawn_over = changed
+            yield
+
+    def take_over(self, whole: Playhead, obj: bpy.types.Object | None, wanted: BakeSettings) -> None:
+        """Go on with a simulation by other settings, and show it."""
+        windows = [*self.playhead.ground.tile_windows(), *whole.ground.tile_windows()]
+        if whole.ground.cell_size != self.playhead.ground.cell_size:
+            self.ground.forget_cells()
+        self.playhead = whole
+        if obj is not None:
+            self.show(obj, windows, wanted)
+
+    def discard(self) -> None:
+        """Leave the ground as it was before."""
+        ground = settings.find(self.owner) or self.ground.object(None)
+        if ground is not None:
+            baked_ground.clear(ground)
+
+
+def touched(loads: Sequence[CharacterLoads]) -> bool:
+    """True if soles touch a ground that bears these loads."""
+    return any(bool(np.any(character.contacts.touching)) for character in loads)
