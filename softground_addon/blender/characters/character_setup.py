@@ -21,7 +21,7 @@ from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_ar
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, time_stretch_of
-from .import_fixes import is_captured, mass_of, put_under, size_of, stature_of
+from .import_fixes import is_captured, mass_of, put_under, sizes_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
@@ -187,7 +187,7 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
         If its size needs no change, or it is linked.
     """
     armature = character.armature
-    size = stature_of(scene.unit_settings.scale_length, armature) if armature else 0.0
+    size, _ = sizes_of(scene.unit_settings.scale_length, character)
     factor = scale_to_metres(size, captured=is_captured(character))
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
@@ -223,7 +223,6 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
 
 def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping) -> None:
     character.skin_mass = mapping.mass
-    character.size = size_of(unit_scale, character.armature) if character.armature else 0.0
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:
@@ -239,6 +238,7 @@ def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping
         sole.kind = "LIMB" if source.limb else "FOOT"
         for bone in source.parts:
             sole.parts.add().name = bone
+    _, character.size = sizes_of(unit_scale, character)
 
 
 def title_of(character: SoftGroundCharacter) -> str:

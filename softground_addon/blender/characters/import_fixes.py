@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -10,22 +11,42 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.people import has_two_legs, likely_mass
+from ...core.motion.people import has_two_legs, likely_mass, sizes_by_legs
 from ...core.rig.bones import extent, stature
+from ...core.rig.mapping import BoneEnd
 from ..compat import action_curves
 from ..rigs.frame_ranges import ancestors
 from ..sampling.skin_sampling import meshes_on
 from ..settings import frame_rate_of, time_stretch_of
 
 
-def size_of(unit_scale: float, armature: bpy.types.Object) -> float:
-    """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog; 0 without bones."""
-    return extent(_heads(armature), np.array(armature.matrix_world)) * unit_scale
+def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
+    """Its `CharacterMotion.stature` and `size` as its rig stands now [m]; 0 without bones."""
+    if not character.armature:
+        return 0.0, 0.0
+    joints = {joint.name: (joint.bone, joint.end.lower()) for joint in character.joints}
+    return sizes_at_rest(
+        unit_scale, character.armature, joints, soles=len(character.soles), has_skin=character.skin_mass > 0
+    )
 
 
-def stature_of(unit_scale: float, armature: bpy.types.Object) -> float:
-    """Its `CharacterMotion.stature` as it stands now [m]; 0 without bones."""
-    return stature(_heads(armature), np.array(armature.matrix_world)) * unit_scale
+def sizes_at_rest(
+    unit_scale: float, armature: bpy.types.Object, joints: Mapping[str, BoneEnd], *, soles: int, has_skin: bool
+) -> tuple[float, float]:
+    """The same of an armature with some joints and so many soles."""
+    if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
+        return 0.0, 0.0
+    bones = armature.data.bones
+    heads, world = np.zeros((len(bones), 3), dtype=np.float32), np.array(armature.matrix_world)
+    bones.foreach_get("head_local", heads.reshape(-1))
+    sizes = stature(heads.astype(float), world), extent(heads.astype(float), world)
+    names = [f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle")]
+    legs = [joints.get(name, ("", "")) for name in names]
+    if has_two_legs(joints, soles) and all(bone in bones for bone, _ in legs):
+        ends = np.array([getattr(bones[bone], f"{end}_local") for bone, end in legs]).reshape(2, 3, 3)
+        lengths = np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1)
+        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), has_skin=has_skin)
+    return sizes[0] * unit_scale, sizes[1] * unit_scale
 
 
 def has_legs(character: Any) -> bool:
@@ -41,14 +62,6 @@ def mass_of(character: Any) -> float:
 def is_captured(character: Any) -> bool:
     """True if a character is the skeleton of a person without a skin, as of motion capture."""
     return has_legs(character) and not character.skin_mass > 0
-
-
-def _heads(armature: bpy.types.Object) -> NDArray[np.float64]:
-    bones = armature.data.bones if armature.data else ()  # a linked rig whose library is gone has no data
-    heads = np.zeros((len(bones), 3), dtype=np.float32)
-    if len(bones):
-        bones.foreach_get("head_local", heads.reshape(-1))
-    return heads.astype(float)
 
 
 PUT_UNDER = "softground_empty"

@@ -17,7 +17,7 @@ from .. import session, settings
 from ..baking import bake_report
 from ..characters import selection
 from ..characters.character_setup import title_of
-from ..characters.import_fixes import is_captured, stature_of
+from ..characters.import_fixes import is_captured, sizes_of
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
@@ -101,7 +101,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
 
 def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     """What size a character has whose file is in other units, and a button that puts it right."""
-    size = stature_of(unit_scale, character.armature) if character.armature else 0.0
+    size, _ = sizes_of(unit_scale, character)
     captured = is_captured(character)
     factor = scale_to_metres(size, captured=captured)
     if factor == 1.0:

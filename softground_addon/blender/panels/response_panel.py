@@ -13,7 +13,7 @@ from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, bod
 from .. import session, settings
 from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
 from ..baking import root_motion
-from ..characters.import_fixes import stature_of
+from ..characters.import_fixes import sizes_of
 from ..operators.character_editing import active_character
 from ..operators.panel_base import CharacterPanel, SidebarPanel
 from ..response import response_job
@@ -53,7 +53,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
             character
             and character.armature
             and character.mass > 0
-            and stature_of(scene.unit_settings.scale_length, character.armature) > 0
+            and sizes_of(scene.unit_settings.scale_length, character)[0] > 0
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -61,7 +61,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
         character = active_character(scene.softground)
         body = {
             "mass": character.mass,
-            "arm": CENTRE_HEIGHT * stature_of(scene.unit_settings.scale_length, character.armature),
+            "arm": CENTRE_HEIGHT * sizes_of(scene.unit_settings.scale_length, character)[0],
         }
         gains = {
             "DEFAULT": TiltGains(),

@@ -55,7 +55,7 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = Tr
             joints, feet = shape
             by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
             mapping = by_shape if mapping is None else _completed(mapping, by_shape)
-    if mapping is None:
+    if mapping is None or not mapping.soles:
         raise InputError(
             f"No feet found in '{armature.name}', neither by the names of its bones nor by how they lie: "
             f"{CHOOSE_CONTACTS}."
@@ -73,8 +73,11 @@ def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
     """The mapping by names, completed from the shape of the rest pose.
 
     A leg that is named in part is taken whole from the shape, as its words may mean other bones; of arms and trunk, the
-    missing joints. Limbs on which the two disagree stay as they are named, and what is named a leg is no arm.
+    missing joints. Limbs on which the two disagree stay as they are named, and what is named a leg is no arm. Legs that
+    are misread, so that none is named, are taken from the shape.
     """
+    if not named.soles:
+        return RigMapping({**shaped.joints, **named.joints}, shaped.soles, shaped.method)
     joints, soles, by_shape = dict(named.joints), named.soles, dict(shaped.joints)
     arms, named_legs = ({f"{joint}_{side}" for joint in limb for side in "lr"} for limb in (_ARM, _LEG))
     legs = {joints[joint][0] for joint in named_legs & joints.keys()}

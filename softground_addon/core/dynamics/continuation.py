@@ -21,6 +21,14 @@ SAME_POSE = 1e-5
 """Poses that differ by less are the same, in leg lengths."""
 LONGEST_HOLD = 0.25
 """A pose that stays longer is a rest and not a stepped key [s]: keys on threes at 12 frames a second."""
+EASE = 1 / 24
+"""Time between keys [s]: those of most actions, which ease from the first key and into the last."""
+LONGEST_EASE = 0.15
+"""It is no longer than this, in sqrt(leg length/gravity): small bodies start in less."""
+STARTS = 0.01
+"""A body that moves less in that time stands or stops, in leg lengths (0.2 m/s for an adult)."""
+EASES = 0.8
+"""Share of its speed over that time at which a body begins that eases: 1 for a steady one."""
 LIKE_POSE = 0.05
 """Poses are alike when joints and soles are this near on average, in leg lengths (5 cm for an adult)."""
 VELOCITY_WEIGHT = 0.3
@@ -32,10 +40,11 @@ CONTINUATION = 1.0
 def without_holds(motion: CharacterMotion) -> CharacterMotion:
     """The motion between stepped keys, where poses are held for a few frames each.
 
-    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated. Soles alone do not
-    tell held poses from feet that all stand while their body goes on: without joints, skin bears when it did.
+    Every pose stays at the frame where it first shows; the frames that repeat it are interpolated, and those between
+    the keys at both ends of the action. Soles alone do not tell held poses from feet that all stand while their body
+    goes on: without joints, skin bears when it did.
     """
-    held = _held(motion)
+    held = _held(motion) | _eased(motion)
     if not held.any():
         return motion
     known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
@@ -127,6 +136,25 @@ def _held(motion: CharacterMotion) -> Mask:
         if (last - first + 1) * motion.time_step > LONGEST_HOLD or last == len(held):
             held[first:last] = False
     return held
+
+
+def _eased(motion: CharacterMotion) -> Mask:
+    """Frames within `EASE` of an end at which the whole body starts or stops in that time.
+
+    The first and the last key of a cut take have flat handles: what walks on in the take seems to stand there, the more
+    so the more frames there are between keys.
+    """
+    paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
+    ease = min(EASE, LONGEST_EASE * motion.pendulum_time)
+    eased, count = np.zeros(len(motion.frames), dtype=bool), round(ease / motion.time_step)
+    if not 1 < count < len(eased) / 2:
+        return eased
+    for order in (slice(None), slice(None, None, -1)):
+        way = np.diff([path[order][[0, 1, count]] for path in paths], axis=1)
+        whole = way.sum(axis=1)
+        moves = np.linalg.norm(whole, axis=1).mean() > STARTS * motion.leg_length
+        eased[order][1:count] = moves and count * (way[:, 0] * whole).sum() < EASES * (whole**2).sum()
+    return eased
 
 
 def _mapped(motion: CharacterMotion, change: Callable[[Array], Array]) -> CharacterMotion:

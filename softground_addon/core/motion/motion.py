@@ -119,9 +119,11 @@ class CharacterMotion:
     skin : LowSkin or None
         Where its skin is lowest, at the frames that were read.
     stature : float
-        Height of its bones at rest [m], or a third of their length if it is low; 0 without a rig.
+        Height of its bones at rest [m], or a third of their length if it is low; on two legs without a skin, by the
+        length of its legs. 0 without a rig.
     size : float
-        Largest extent of its bones at rest [m]; 0 without a rig.
+        Largest extent of its bones at rest, or on two legs the height that suits these if that is more [m]; 0 without
+        a rig.
     bones_move : bool
         True if some bone that was read moves, though it may carry no joint and no sole: a head that nods.
     ride : GroundRide or None

@@ -8,6 +8,9 @@ from math import floor, log10
 PERSON_MASS, PERSON_HEIGHT = 77.5, 1.78
 """A person [kg], [m]."""
 
+LEG_SHARE = 0.491
+"""Thigh and shank of a person over its height (Drillis and Contini 1966)."""
+
 MASS_RANGE = 4.0
 """Ratio of a mass to the likely one beyond which it is asked about."""
 
@@ -17,6 +20,22 @@ _LEGS = frozenset(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for si
 def has_two_legs(joints: Collection[str], soles: int) -> bool:
     """True for joints of two legs on which a body stands with as many soles."""
     return _LEGS.issubset(joints) and soles == 2
+
+
+def sizes_by_legs(stature: float, size: float, leg: float, *, has_skin: bool) -> tuple[float, float]:
+    """Stature and size of a body on two legs [m], from those of its joints at rest and its thigh and shank together.
+
+    Skeletons without a skin are captured motion, whose rest pose may be a split; and no joint is at the top of a head.
+
+    Examples
+    --------
+    >>> [round(length, 2) for length in sizes_by_legs(1.0, 1.84, 0.8, has_skin=False)]
+    [1.63, 1.84]
+    >>> [round(length, 2) for length in sizes_by_legs(1.55, 1.55, 0.874, has_skin=True)]
+    [1.55, 1.78]
+    """
+    height = leg / LEG_SHARE
+    return stature if has_skin or not height else height, max(size, height)
 
 
 def likely_mass(by_volume: float, size: float, *, two_legs: bool) -> tuple[float, str]:

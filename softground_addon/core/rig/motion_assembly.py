@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CENTRE, CharacterMotion
+from ..motion.people import has_two_legs, sizes_by_legs
 from ..motion.props import capsule
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array
@@ -120,6 +121,10 @@ def assemble_motion(
         joints[CENTRE] = centre_of_volume(skin, bones, recording)
 
     heads = np.array([bone.head for bone in bones.values()])
+    four_legged = rest.is_four_legged(mapping)
+    sizes_at_rest = stature(heads, recording.armature[0]), extent(heads, recording.armature[0])
+    if has_two_legs(mapping.joints, len(mapping.soles)) and not four_legged:
+        sizes_at_rest = sizes_by_legs(*sizes_at_rest, leg, has_skin=skin is not None)
     return CharacterMotion(
         name=name,
         mass=mass,
@@ -129,12 +134,12 @@ def assemble_motion(
         soles=tuple(motions[source.name] for source in mapping.soles),
         joints=joints,
         gravity=gravity,
-        four_legged=rest.is_four_legged(mapping),
+        four_legged=four_legged,
         ground_level=stances.level if stances else None,
         skin=stances.skin if stances else None,
         bones_move=recording.bones_move,
-        stature=stature(heads, recording.armature[0]),
-        size=extent(heads, recording.armature[0]),
+        stature=sizes_at_rest[0],
+        size=sizes_at_rest[1],
     )
 
 

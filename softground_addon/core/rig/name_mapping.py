@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
@@ -21,8 +22,11 @@ _JOINT_HEADS = {
 }
 """Joint to the segment whose head it is."""
 
-_SEGMENTS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand"))
+_SEGMENTS = {"leg": ("thigh", "shin", "foot", "toe"), "arm": ("upper_arm", "forearm", "hand")}
 """Segments of legs and arms, from the body outward."""
+
+_Limb = tuple[str, str]
+"""A leg or an arm, and its side."""
 
 _TOES_REACH = 0.2
 """Toes that hang elsewhere than on their foot begin this near to it, over the size of the rig."""
@@ -32,7 +36,10 @@ _HIPS_OF_SOME = ("root", "cog", "spine")
 
 
 def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
-    """The mapping that the names give, or None where they name no foot, or limbs that hang together as none do.
+    """The mapping that the names give, or None where they name no foot.
+
+    Limbs that hang together as none do are left out. Where a leg is among them, so are both legs and all soles, as well
+    as arms that are named in part and a trunk that hangs on a limb.
 
     Parameters
     ----------
@@ -40,33 +47,53 @@ def map_by_names(bones: RigBones, deforming: Set[str]) -> RigMapping | None:
         Names of those that move a mesh.
     """
     names = read_names(bones, deforming)
-    joints: dict[str, BoneEnd] = {}
-    soles, limbs = [], []
-    for side, suffix in (("L", "_l"), ("R", "_r")):
+    limbs: dict[_Limb, list[str]] = {}
+    for side in "LR":
         limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
         _settle_ambiguities(limb, names, bones, side, deforming)
         _keep_to_one_leg(limb, names, bones, side)
-        limbs += [[limb[segment] for segment in segments] for segments in _SEGMENTS]
-        foot, toe = limb["foot"], limb["toe"]
-        for joint, segment in _JOINT_HEADS.items():
-            if bone := limb[segment]:
-                joints[joint + suffix] = (bone, "head")
-        if "wrist" + suffix not in joints and limb["forearm"]:
-            joints["wrist" + suffix] = (limb["forearm"], "tail")
-        if foot or toe:
+        limbs |= {(part, side): [limb[segment] for segment in _SEGMENTS[part]] for part in _SEGMENTS}
+    if not any(limbs["leg", side][2] or limbs["leg", side][3] for side in "LR"):
+        return None
+    misread = _misread(limbs, bones)
+    shows_legs = not any(part == "leg" for part, _ in misread)
+    if not shows_legs:
+        misread |= {limb for limb, chain in limbs.items() if limb[0] == "leg" or not all(chain)}
+    joints: dict[str, BoneEnd] = {}
+    soles = []
+    for (part, side), chain in limbs.items():
+        if (part, side) in misread:
+            continue
+        suffix = f"_{side.lower()}"
+        named = {segment: bone for segment, bone in zip(_SEGMENTS[part], chain, strict=True) if bone}
+        joints |= {joint + suffix: (named[of], "head") for joint, of in _JOINT_HEADS.items() if of in named}
+        if "forearm" in named and "hand" not in named:
+            joints["wrist" + suffix] = (named["forearm"], "tail")
+        if part == "leg" and (chain[2] or chain[3]):
+            foot, toe = chain[2:]
             joints["toe" + suffix] = (toe or foot, "tail")
             soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
-    if not soles or not _are_limbs(limbs, bones):
-        return None
-    joints.update(_map_trunk(names, bones, joints, deforming))
+    trunk = _map_trunk(names, bones, joints, deforming)
+    on_limbs = {bone for chain in limbs.values() for bone in chain if bone}
+    if shows_legs or not any(on_limbs.intersection((bone, *above(bones, bone))) for bone, _ in trunk.values()):
+        joints |= trunk
     return RigMapping(joints=joints, soles=tuple(soles))
 
 
-def _are_limbs(limbs: Sequence[Sequence[str]], bones: RigBones) -> bool:
-    """True if no limb hangs on another one, and none of its segments on one farther out; empty names are no bones."""
-    place = {bone: (limb, number) for limb, chain in enumerate(limbs) for number, bone in enumerate(chain) if bone}
-    pairs = ((place[bone], place[upper]) for bone in place for upper in above(bones, bone) if upper in place)
-    return all(limb == other and number > before for (limb, number), (other, before) in pairs)
+def _misread(limbs: Mapping[_Limb, Sequence[str]], bones: RigBones) -> set[_Limb]:
+    """The limbs that hang on others, or of which a segment hangs on one farther out; empty names are no bones.
+
+    Of two of which one hangs on the other, that is misread which is so to more of them; both where that is the same.
+    """
+    place = {bone: (limb, number) for limb, chain in limbs.items() for number, bone in enumerate(chain) if bone}
+    pairs = [(place[bone], place[upper]) for bone in place for upper in above(bones, bone) if upper in place]
+    wrong = [{limb, other} for (limb, number), (other, before) in pairs if limb != other or number <= before]
+    misread: set[_Limb] = set()
+    while wrong:
+        counts = Counter(limb for pair in wrong for limb in pair)
+        misread |= {limb for limb, count in counts.items() if count == max(counts.values())}
+        wrong = [pair for pair in wrong if not pair & misread]
+    return misread
 
 
 def _settle_ambiguities(

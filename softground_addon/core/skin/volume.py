@@ -1,8 +1,8 @@
 """Volume of a body from its skin, cut in slices: it may have holes, layers and parts within parts.
 
 The skin cuts a slice in curves that enclose areas. The area of a closed curve whose faces agree on the inside is exact;
-other curves have gaps, and their convex hulls stand for them. Curves within others are clothes or lie inside, and count
-once. A curve that encloses next to nothing, such as that of a cape, has no area.
+other curves have gaps, and their convex hulls stand for them. Curves within others are clothes, lie inside or are the
+same skin with fewer faces, and count once. A curve that encloses next to nothing, such as that of a cape, has no area.
 """
 
 from __future__ import annotations
@@ -25,6 +25,11 @@ TWICE, NOTHING = 1.5, 0.1
 """A curve that is so much longer than its hull, around less than this share of it, goes around it both ways."""
 WITHIN = 0.05
 """A curve may stick out of one that it lies within by so much of that one's radius: cloth and skin cross."""
+SAME = 0.12
+"""One of which so much of its own radius sticks out, on average around, is much the same in its place: a copy of the
+skin with fewer faces."""
+THROUGH = 0.02
+"""Share of the extent of a closed piece by which a body goes on at both ends of one that it wears."""
 MOST_CURVES = 200
 """Curves of one slice that are looked at, the largest first."""
 AS_CLOSED = 0.02
@@ -59,10 +64,13 @@ class Pieces:
         True of an open or a thin sheet, such as a cape, a hat or hair.
     is_cloth : (T,) bool array
         True of a sheet or a piece with wide openings, such as a shirt: if there is skin within, that is the body.
+    number : (T,) int array
+        The piece of each.
     """
 
     is_sheet: Mask
     is_cloth: Mask
+    number: Indices
 
 
 def pieces(points: Array, triangles: Indices) -> Pieces:
@@ -96,7 +104,7 @@ def pieces(points: Array, triangles: Indices) -> Pieces:
     length = np.linalg.norm(np.subtract(*points[ends[:, rim]]), axis=1)
     around = np.bincount(piece[rim % len(triangles)], length, count)
     sheet = (opening > SHEET * area) | (volume < THIN * area**1.5)
-    return Pieces(sheet[piece], (sheet | (around**2 > OPEN * area))[piece])
+    return Pieces(sheet[piece], (sheet | (around**2 > OPEN * area))[piece], piece)
 
 
 @sliced
@@ -150,10 +158,15 @@ def _volume_along(points: Array, triangles: Indices, known: Pieces) -> tuple[flo
     hull, around = _hulls(support)
     of_curve = cut.triangle[np.unique(of_segment, return_index=True)[1]]
     is_round = (length > ROUND * around) & ~known.is_sheet[of_curve]
-    area = np.where(closed, encloses, np.where(is_round, hull, 0.0))
+    area = np.where(closed, np.minimum(encloses, hull), np.where(is_round, hull, 0.0))
     area = np.where(closed & (encloses < NOTHING * hull) & (length > TWICE * around), hull, area)
-    cloth, slices = known.is_cloth[of_curve], _by_slice(cut.slice[order[first]], area)
-    total = sum(_united(support[curves], area[curves], around[curves], cloth[curves]) for curves in slices)
+    height = points[triangles, 2]
+    ends = np.full((2, known.number.max() + 1), [[np.inf], [-np.inf]])
+    np.minimum.at(ends[0], known.number, height.min(axis=1))
+    np.maximum.at(ends[1], known.number, height.max(axis=1))
+    ends, cloth = ends[:, known.number[of_curve]], known.is_cloth[of_curve]
+    slices = _by_slice(cut.slice[order[first]], area)
+    total = sum(_united(support[at], area[at], around[at], cloth[at], ends[:, at]) for at in slices)
     return float(total) * spacing, float(length[closed].sum() / max(length.sum(), 1e-300))
 
 
@@ -208,9 +221,16 @@ def _by_slice(number: Indices, area: Array) -> list[Indices]:
     return [curves[:MOST_CURVES] for curves in np.split(order, np.flatnonzero(np.diff(number[order])) + 1)]
 
 
-def _united(support: Array, area: Array, around: Array, cloth: Mask) -> float:
-    """Area of curves, the largest first, without those within a larger one and without cloth around skin."""
-    sticks_out = (support[None] - support[:, None]).max(axis=2)
-    within = np.triu(sticks_out <= WITHIN * around[:, None] / (2 * np.pi), 1)
-    visible = ~(within & cloth[:, None] & ~cloth).any(axis=1)
+def _united(support: Array, area: Array, around: Array, cloth: Mask, ends: Array) -> float:
+    """Area of curves, the largest first, without those within a larger one and without cloth around skin.
+
+    Cloth is also a closed piece, such as a skirt, through which another goes on at both `ends` (2, C).
+    """
+    sticks_out = np.maximum(support[None] - support[:, None], 0.0)
+    within = sticks_out.max(axis=2) <= WITHIN * around[:, None] / (2 * np.pi)
+    within = np.triu(within | (sticks_out.mean(axis=2) <= SAME * around / (2 * np.pi)), 1)
+    low, high = ends
+    reach = THROUGH * (high - low)[:, None]
+    through = (low < low[:, None] - reach) & (high > high[:, None] + reach)
+    visible = ~(within & (cloth[:, None] | through) & ~cloth).any(axis=1)
     return float(area[visible & ~(within & visible[:, None]).any(axis=0)].sum())

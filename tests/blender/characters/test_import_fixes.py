@@ -6,7 +6,7 @@ import pytest
 
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
-from softground_addon.blender.characters.import_fixes import size_of, stature_of
+from softground_addon.blender.characters.import_fixes import sizes_of
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading import analysis
 from softground_addon.core.motion.units import scale_to_metres
@@ -67,7 +67,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     assert armature.parent.name == "Walker Scale"
     assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
     assert keys == keys_of(armature)
-    assert size_of(scene.unit_settings.scale_length, armature) == pytest.approx(character.size, rel=1e-4)
+    assert sizes_of(scene.unit_settings.scale_length, character)[1] == pytest.approx(character.size, rel=1e-4)
     assert 1.0 < character.size < 2.0
     assert character.mass == pytest.approx(mass, rel=0.05)
     scene.softground.cell_size = 0.02
@@ -90,7 +90,7 @@ def test_the_scale_of_a_character_is_on_one_empty_however_often_it_is_put_right(
         bpy.context.view_layer.update()
         bpy.ops.softground.fix_scale()
         bpy.context.view_layer.update()
-        assert stature_of(1.0, armature) == pytest.approx(1.7, abs=0.3)
+        assert sizes_of(1.0, scene.softground.characters[0])[0] == pytest.approx(1.7, abs=0.3)
         assert (armature.parent.name, armature.parent.parent) == ("Walker Scale", None)
 
 
@@ -180,8 +180,9 @@ def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names
     armature = shots.walker(scene, frames=30)
     bpy.data.objects.remove(armature.children[0])
     bpy.ops.softground.add_character()
-    assert scale_to_metres(stature_of(scene.unit_settings.scale_length, armature), captured=True) == 1.0
-    armature.scale = (0.42 / stature_of(scene.unit_settings.scale_length, armature),) * 3
+    character = scene.softground.characters[0]
+    assert scale_to_metres(sizes_of(scene.unit_settings.scale_length, character)[0], captured=True) == 1.0
+    armature.scale = (0.42 / sizes_of(scene.unit_settings.scale_length, character)[0],) * 3
     bpy.context.view_layer.update()
     scene.softground.cell_size = 0.01
     (finding,) = (each for each in bake(scene).report["self_check"] if each["code"] == "unit_scale")
@@ -190,6 +191,38 @@ def test_captured_motion_of_42_cm_is_scaled_by_the_button_that_its_warning_names
     bpy.ops.softground.clear_bake()
     bpy.ops.softground.fix_scale()
     bpy.context.view_layer.update()
-    assert stature_of(scene.unit_settings.scale_length, armature) == pytest.approx(1.68, rel=0.01)
+    assert sizes_of(scene.unit_settings.scale_length, character)[0] == pytest.approx(1.68, rel=0.01)
     scene.softground.cell_size = 0.02
     assert "unit_scale" not in codes(bake(scene).report)
+
+
+def laid_in_a_split(armature):
+    """Give a rig a rest pose in which legs lie to both sides and the trunk ahead, as some motion files have."""
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature.data.edit_bones
+    origin = bones["thigh.L"].head.z
+    for bone in bones:
+        bone.use_connect = False
+        sided = next((b for b in (bone, *bone.parent_recursive) if b.name.startswith("thigh")), None)
+        for end in ("head", "tail"):
+            x, y, z = getattr(bone, end)
+            side = 1 if x > 0 else -1
+            setattr(bone, end, (x + side * (origin - z), y, origin) if sided else (x, y - (z - origin), origin))
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.25])
+def test_captured_motion_is_as_tall_as_its_legs_are_long_whatever_its_rest_pose(scene, scale):
+    armature = shots.walker(scene, frames=30)
+    bpy.data.objects.remove(armature.children[0])
+    bpy.ops.softground.add_character()
+    character = scene.softground.characters[0]
+    stood, _ = sizes_of(1.0, character)
+    assert stood == pytest.approx(1.75, rel=0.05)
+    laid_in_a_split(armature)
+    armature.scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    stature, _ = sizes_of(1.0, character)
+    assert stature == pytest.approx(scale * stood, rel=0.01)
+    assert scale_to_metres(stature, captured=True) == pytest.approx(1 / scale, rel=0.06)

@@ -75,3 +75,22 @@ def test_a_bone_called_a_foot_is_none_where_the_skin_rests_elsewhere(addon, scen
 def test_toes_are_none_that_are_far_from_their_foot(addon, scene):
     soles, _ = recognised(scene, {"toe.L": "Bone", "head": "toe.L"})
     assert soles == {("foot.L", "", False), ("foot.R", "toe.R", False)}
+
+
+def test_a_misread_arm_costs_no_feet_of_a_rig_whose_rest_pose_says_nothing(addon, scene):
+    armature = walking_figure()
+    bpy.context.view_layer.objects.active = armature
+    for obj in [obj for obj in scene.objects if obj.type == "MESH"]:
+        bpy.data.objects.remove(obj)
+    names = swapped(("hand.L", "upper_arm.L"))
+    for prefix in ("other ", ""):
+        for bone, name in zip(armature.data.bones, [bone.name for bone in armature.data.bones], strict=True):
+            bone.name = prefix + names.get(name.removeprefix("other "), name) if prefix else name.removeprefix("other ")
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:  # along one line, as motion files may lay them
+        bone.use_connect = False
+        bone.head, bone.tail = (0, 0, 0.1 * len(bone.parent_recursive)), (0, 0, 0.1 * len(bone.parent_recursive) + 0.1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mapping = jobs.run(recognise(scene, armature, (1, 96))).mapping
+    assert [(sole.bone, sole.toe_bone) for sole in mapping.soles] == [(f"foot.{side}", f"toe.{side}") for side in SIDES]
+    assert "wrist_r" in mapping.joints

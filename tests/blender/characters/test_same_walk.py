@@ -22,6 +22,15 @@ def as_strip(armature, scene, scale):
     return strip
 
 
+def cut(armature, first, last):
+    """A take without the keys before one frame and after another, at which it eases in and out now."""
+    for curve in action_curves(armature.animation_data.action):
+        for key in reversed(list(curve.keyframe_points)):
+            if not first <= key.co.x <= last:
+                curve.keyframe_points.remove(key, fast=True)
+        curve.update()
+
+
 def remapped(armature, scene):
     scene.render.frame_map_new, scene.render.fps = 200, 48
 
@@ -84,3 +93,19 @@ def test_a_walk_keeps_its_steps_and_its_loads(addon, change):
     assert others[:, :2] == pytest.approx(steps[:, :2], abs=0.045)
     whole = slice(2, -1)  # what a shot cuts off is bridged from its other strides, which depends on its samples
     assert others[whole, 2] == pytest.approx(steps[whole, 2], rel=0.03)
+
+
+@pytest.mark.parametrize("rate", [48, 120])
+@pytest.mark.parametrize(
+    ("first", "error"), [(17, 0.06), (32, 0.06), (38, 0.2)]
+)  # the last begins with 0.1 s of a step
+def test_the_ends_of_a_cut_take_bear_alike_at_all_frame_rates(addon, first, error, rate):
+    def at(rate):
+        def change(armature, scene):
+            cut(armature, first, first + 36)
+            at_rate(rate)(armature, scene)
+
+        steps, _ = steps_of(change)
+        return steps[steps[:, 1] - steps[:, 0] > 0.07]  # what has just landed bears by chance
+
+    assert at(rate) == pytest.approx(at(24), rel=error, abs=0.03)

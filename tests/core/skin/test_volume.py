@@ -100,6 +100,25 @@ def test_a_copy_of_the_skin_in_its_place_counts_once():
     assert body_volume(vertices, np.concatenate([triangles, corners])) == pytest.approx(BALL, rel=0.02)
 
 
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("sides", [4, 6, 9])
+@pytest.mark.parametrize("size", [0.95, 1.0, 1.1])
+def test_a_copy_of_the_skin_with_fewer_faces_counts_once(sides, size, turn):
+    fine, coarse = wheel(0.2, 1.0), wheel(0.2 * size, 1.0 * size, sides=sides)
+    once, other = (body_volume(*turned(each, turn)) for each in (fine, coarse))
+    assert min(once, other) * 0.98 < body_volume(*turned(united(fine, coarse), turn)) < 1.05 * max(once, other)
+
+
+def test_a_copy_that_shares_half_of_its_faces_counts_once():
+    vertices, triangles = sphere(1.0)
+    coarse = vertices.copy()
+    coarse[: len(vertices) // 4] *= 0.97
+    both = np.concatenate([vertices, coarse]), np.concatenate([triangles, triangles + len(vertices)])
+    place = welded(both[0])
+    _, first = np.unique(place, return_index=True)
+    assert body_volume(both[0][first], place[both[1]]) == pytest.approx(BALL, rel=0.05)
+
+
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_faces_that_lie_on_each_other_back_to_back_take_nothing_away(share):
     vertices, triangles = sphere(1.0)
@@ -140,6 +159,14 @@ def test_cloth_around_skin_is_no_body_and_cloth_around_nothing_is():
     leg, skirt = wheel(0.1, 1.0), without(wheel(0.5, 1.0), lambda x, y, z: np.abs(y) < 0.49)
     assert body_volume(*united(leg, skirt)) == pytest.approx(np.pi * 0.01, rel=0.05)
     assert body_volume(*united(moved(leg, (2.0, 0, 0)), skirt)) == pytest.approx(np.pi * 0.26, rel=0.05)
+
+
+def test_a_closed_skirt_around_a_body_that_goes_on_at_both_ends_is_no_body():
+    upright = (np.pi / 2, 0.0, 0.0)
+    body, skirt = wheel(0.1, 3.0), wheel(0.5, 1.0)
+    assert body_volume(*turned(united(body, skirt), upright)) == pytest.approx(np.pi * 0.03, rel=0.05)
+    leg = moved(wheel(0.1, 1.0), (0.0, 0.5, 0.0))  # which begins within it
+    assert body_volume(*turned(united(leg, skirt), upright)) == pytest.approx(np.pi * (0.25 + 0.005), rel=0.05)
 
 
 def test_components_are_those_of_a_random_graph():
