@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ...core.carried.ageing import AgedMark, aged
 from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.relief.tread import LENGTH, PADS
 from ..compat import shader_tree
@@ -37,10 +38,11 @@ def material_for(surface: SurfaceRecord | Liquid) -> bpy.types.Material:
     tree = shader_tree(material)
     tree.nodes.clear()
     graph = Graph(tree)
-    amount, edge = _amount(graph, surface)
-    wet = graph.attribute(nodes.WETNESS)
+    now = now_by_clock(graph, surface)
+    amount, edge = _amount(graph, surface, now.mass)
+    wet = now.wetness
     if surface.melts:
-        shader, height = _snow(graph, amount, edge, wet)
+        shader, height = _snow(graph, amount, edge, wet, now.melted)
     elif surface.name == "water":
         shader, height = _damp(graph, _thin(graph, amount, edge, wet)), wet * 0.0
     else:
@@ -50,7 +52,22 @@ def material_for(surface: SurfaceRecord | Liquid) -> bpy.types.Material:
     return material
 
 
-def _amount(graph: Graph, surface: SurfaceRecord | Liquid) -> tuple[Socket, Socket]:
+def reads_clock(material: bpy.types.Material) -> bool:
+    """True of a material that works out by itself how marks age."""
+    tree = material.node_tree
+    return tree is not None and any(getattr(node, "attribute_name", "") == nodes.CLOCK for node in tree.nodes)
+
+
+def now_by_clock(graph: Graph, surface: SurfaceRecord | Liquid) -> AgedMark:
+    """What marks have come to by the clock."""
+    clock = graph.out(graph.node("ShaderNodeAttribute", attribute_name=nodes.CLOCK), 1)
+    separate = graph.node("ShaderNodeSeparateXYZ", {0: clock})
+    frame, drying, rain = (graph.out(separate, axis) for axis in range(3))
+    warmth = graph.attribute(nodes.WARMTH) if surface.melts else None
+    return aged(graph.attribute(nodes.MASS), frame - graph.attribute(nodes.BIRTH), surface, drying, rain, warmth)
+
+
+def _amount(graph: Graph, surface: SurfaceRecord | Liquid, mass: Socket) -> tuple[Socket, Socket]:
     """How much lies at a place, over what covers a floor, and 1 under the sole, 0 beside it."""
     assert surface.carried is not None
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
@@ -63,7 +80,7 @@ def _amount(graph: Graph, surface: SurfaceRecord | Liquid) -> tuple[Socket, Sock
     groove = graph.math("ABSOLUTE", phase + -0.5, 0.0)
     is_shod = graph.math("GREATER_THAN", graph.attribute(nodes.TREAD), 0.0)
     lug = graph.blend(is_shod, 0.8, graph.ramp(groove, *GROOVES, 1.0, 0.25))
-    full = graph.attribute(nodes.MASS) * (1.0 / (COVERED * surface.carried.most))
+    full = mass * (1.0 / (COVERED * surface.carried.most))
     patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.55, 1.3)
     amount = full * lug * patches + (coarse * 1.7 + fine * 0.9) * graph.ramp(full, 0.0, 0.5)
     ragged = distance + coarse * 0.010 + fine * 0.004
@@ -111,10 +128,9 @@ def _earth(
     return graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs)), height
 
 
-def _snow(graph: Graph, amount: Socket, edge: Socket, wet: Socket) -> tuple[Socket, Socket]:
+def _snow(graph: Graph, amount: Socket, edge: Socket, wet: Socket, melted: Socket) -> tuple[Socket, Socket]:
     """Snow, and what is left of it: water, which dries without a trace."""
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
-    melted = graph.attribute(nodes.MELTED)
     alpha = graph.ramp(graph.math("SUBTRACT", amount, melted * 1.2), 0.05, 0.30) * edge
     inputs = {"Base Color": (0.87, 0.90, 0.94, 1.0), "Roughness": 0.7, "Alpha": alpha}
     lying = graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs))

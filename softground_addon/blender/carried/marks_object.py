@@ -17,6 +17,7 @@ from ...core.carried.floor_steps import FloorSteps, SoleOnFloors
 from ...core.carried.marks import Marks
 from ...core.ground import surfaces
 from ...core.meshing.face_edges import face_edges
+from ...core.numerics.arrays import Array
 from ...core.record.record import EditableStep
 from ...core.rig.recording import SceneUnits
 from .. import compat, mesh_arrays
@@ -25,13 +26,15 @@ from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import curves_of, inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from . import marks_nodes as nodes
-from .marks_material import material_for
+from .marks_material import material_for, reads_clock
 
 NAME = nodes.GROUP
 BELONGS = Belonging(nodes.MARK, "softground_marked", "softground_marked_by")
 of = BELONGS.of
 ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 """Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
+SELECTED = {".select_vert", ".select_edge", ".select_poly"}
+"""What new elements of a mesh are, which takes a thirtieth of it in a file."""
 FLOORS, THICKNESS = "softground_floors", "softground_thickness"
 """Of its mesh: steps on hard floors, and how much thicker it is for its mass [Blender units m²/kg]."""
 
@@ -58,7 +61,10 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     BELONGS.give(ground, obj)
     if units.frame:
         hang_on(obj, ground, units.frame)
-    _play(modifier or obj.modifiers.new(NAME, "NODES"), group)
+    modifier = modifier or obj.modifiers.new(NAME, "NODES")
+    _play(modifier, group)
+    if not all(slot is None or reads_clock(slot) for slot in mesh.materials):  # another's, or of an earlier version
+        set_inputs(modifier, {nodes.IN_VIEW.name: True})
     _remove_unused()
     return obj
 
@@ -76,14 +82,17 @@ def follow(ground: bpy.types.Object, steps: Sequence[EditableStep], shed: Mappin
     mesh: Any = obj and obj.data
     if obj is None or not has_numbers(obj):
         return
-    share, zone, step, before = (values(mesh, name) for name in (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.MASS))
+    names = (nodes.SHARE, nodes.ZONE, nodes.STEP, nodes.BIRTH, nodes.MASS)
+    share, zone, step, birth, before = (values(mesh, name) for name in names)
     films, _ = floors_of(obj).films(steps, shed)
     each = np.array([films[number] for number in range(len(films))])
-    mass = _or_nothing(each[step.astype(int), zone.astype(int)] * share, step.astype(int))
+    mass = each[step.astype(int), zone.astype(int)] * share
+    birth = _or_never(birth - nodes.NEVER * (birth > nodes.NEVER / 2), mass, step.astype(int))
     place = mesh_arrays.positions(mesh)
-    place[:, 2] += (np.maximum(mass, 0.0) - np.maximum(before, 0.0)) * mesh[THICKNESS]
+    place[:, 2] += (mass - np.maximum(before, 0.0)) * mesh[THICKNESS]  # less than 0 of an earlier version
     mesh.vertices.foreach_set("co", place.astype(np.float32).ravel())
-    mesh.attributes[nodes.MASS].data.foreach_set("value", mass.astype(np.float32))
+    for name, numbers in ((nodes.MASS, mass), (nodes.BIRTH, birth)):
+        mesh.attributes[name].data.foreach_set("value", numbers.astype(np.float32))
     mesh.update()
 
 
@@ -108,9 +117,9 @@ def has_numbers(obj: bpy.types.Object) -> bool:
     return mesh.get(FLOORS) is not None and names <= {*mesh.attributes.keys()}
 
 
-def _or_nothing(mass: NDArray[np.float64], step: NDArray[Any]) -> NDArray[np.float64]:
-    """Mass of vertices, `NOTHING` of those of marks that weigh nothing."""
-    return np.where(np.bincount(step, mass)[step] > 0, mass, nodes.NOTHING) if len(step) else mass
+def _or_never(birth: Array, mass: Array, step: NDArray[Any]) -> Array:
+    """Births of vertices, without those of marks that weigh nothing."""
+    return np.where(np.bincount(step, mass)[step] > 0, birth, birth + nodes.NEVER) if len(step) else birth
 
 
 def _text(floors: FloorSteps) -> str:
@@ -135,7 +144,7 @@ def fields_of(obj: bpy.types.Object) -> list[tuple[str, tuple[Any, str]]]:
     if modifier is None:
         return []
     inputs = inputs_of(modifier)
-    return [(name, compat.input_field(modifier, inputs[name])) for name, *_ in nodes.INPUTS if name in inputs]
+    return [(name, compat.input_field(modifier, inputs[name])) for name, *_ in nodes.SLIDERS if name in inputs]
 
 
 def remove(ground: bpy.types.Object) -> None:
@@ -198,14 +207,16 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     record = surfaces.sticking(surface)
     assert record.carried is not None
     unit_scale = units.unit_scale_m
+    marks = marks.in_turn()
+    birth = np.round(marks.birth * units.time_stretch * 8) / 8  # which is so as well where they never come
     place = marks.position / unit_scale
     place[:, 2] += marks.mass / record.density / unit_scale
     origin = marks.position[0] / unit_scale
     corners, starts = marks.faces.ravel(), 4 * np.arange(len(marks.faces))
     edges, of_corner = face_edges(corners, starts)
     columns = (
-        (nodes.BIRTH, "FLOAT", marks.birth * units.time_stretch),
-        (nodes.MASS, "FLOAT", _or_nothing(marks.mass, marks.step)),
+        (nodes.BIRTH, "FLOAT", _or_never(birth, marks.mass, marks.step)),
+        (nodes.MASS, "FLOAT", marks.mass),
         (nodes.SHARE, "FLOAT", marks.share),
         (nodes.ZONE, "INT8", marks.zone),
         (nodes.TREAD, "FLOAT", marks.tread),
@@ -219,5 +230,7 @@ def _mesh(marks: Marks, surface: str, units: SceneUnits) -> bpy.types.Mesh:
     mesh[THICKNESS] = 1.0 / record.density / unit_scale
     mesh_arrays.add_faces(mesh, corners, starts, edges, of_corner)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(starts), bool))
+    for name in SELECTED & {*mesh.attributes.keys()}:
+        mesh.attributes.remove(mesh.attributes[name])
     mesh.update()
     return mesh

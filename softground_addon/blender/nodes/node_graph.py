@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
+
+from .arithmetic import Arithmetic
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
@@ -265,46 +266,11 @@ def _is(value: Any, other: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Number:
+class Number(Arithmetic):
     """An output of a group's node, with arithmetic; what is divided by nothing is nothing."""
 
     graph: NodeGraph
     socket: Any
-
-    def __add__(self, other: Number | float) -> Number:
-        return self._with("ADD", other)
-
-    def __sub__(self, other: Number | float) -> Number:
-        return self._with("SUBTRACT", other)
-
-    def __mul__(self, other: Number | float) -> Number:
-        return self._with("MULTIPLY", other)
-
-    def __truediv__(self, other: Number | float) -> Number:
-        return self._with("DIVIDE", other)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __array_ufunc__(self, function: np.ufunc, _method: str, *operands: Number | float) -> Number:
-        """Numpy's functions as nodes, so that what is a law for arrays is one for these."""
-        return _FUNCTIONS[function](
-            *(operand if isinstance(operand, Number) else self.graph.number(operand) for operand in operands)
-        )
-
-    def __rsub__(self, other: float) -> Number:
-        return Number(self.graph, self.graph.math("SUBTRACT", other, self.socket))
-
-    def above(self, other: Number | float) -> Number:
-        """1 where it is more than another, else 0."""
-        return self._with("GREATER_THAN", other)
-
-    def at_least(self, other: Number | float) -> Number:
-        """The larger of two."""
-        return self._with("MAXIMUM", other)
-
-    def at_most(self, other: Number | float) -> Number:
-        """The smaller of two."""
-        return self._with("MINIMUM", other)
 
     def where(self, *acting: Number, otherwise: Number | float = 0.0) -> Number:
         """This, or another where none of some numbers, the same everywhere and never negative, is above 0.
@@ -318,40 +284,9 @@ class Number:
         """No less than 0, no more than 1."""
         return Number(self.graph, self.graph.math("ADD", self.socket, 0.0, clamped=True))
 
-    def exp(self) -> Number:
-        return self._with("EXPONENT", 0.0)
-
-    def log(self) -> Number:
-        return self._with("LOGARITHM", math.e)
-
-    def root(self) -> Number:
-        return self._with("SQRT", 0.0)
-
-    def arccos(self) -> Number:
-        return self._with("ARCCOSINE", 0.0)
-
-    def floor(self) -> Number:
-        return self._with("FLOOR", 0.0)
-
-    def fraction(self) -> Number:
-        return self._with("FRACT", 0.0)
-
-    def _with(self, operation: str, other: Number | float) -> Number:
-        value = other.socket if isinstance(other, Number) else other
-        return Number(self.graph, self.graph.math(operation, self.socket, value))
+    def calculated(self, operation: str, first: Number | float, second: Number | float) -> Number:
+        return Number(self.graph, self.graph.math(operation, *map(_socket, (first, second))))
 
 
-_FUNCTIONS: Mapping[np.ufunc, Callable[..., Number]] = {
-    np.add: Number.__add__,
-    np.subtract: Number.__sub__,
-    np.multiply: Number.__mul__,
-    np.divide: Number.__truediv__,
-    np.minimum: Number.at_most,
-    np.maximum: Number.at_least,
-    np.greater: Number.above,
-    np.exp: Number.exp,
-    np.expm1: lambda number: number.exp() - 1.0,
-    np.log1p: lambda number: (number + 1.0).log(),
-    np.sqrt: Number.root,
-    np.arccos: Number.arccos,
-}
+def _socket(value: Number | float) -> Any:
+    return value.socket if isinstance(value, Number) else value

@@ -8,6 +8,8 @@ from typing import Any
 
 import bpy
 
+from .arithmetic import Arithmetic
+
 Colour = tuple[float, float, float]
 
 FLAT = 0.1
@@ -16,17 +18,14 @@ the time, which in EEVEE is most of a material's."""
 
 
 @dataclass(frozen=True)
-class Socket:
+class Socket(Arithmetic):
     """An output of a node, with the arithmetic of shader graphs."""
 
     graph: Graph
     output: Any
 
-    def __add__(self, other: Socket | float) -> Socket:
-        return self.graph.math("ADD", self, other)
-
-    def __mul__(self, other: Socket | float) -> Socket:
-        return self.graph.math("MULTIPLY", self, other)
+    def calculated(self, operation: str, first: Socket | float, second: Socket | float) -> Socket:
+        return self.graph.math(operation, first, second)
 
 
 class Graph:

@@ -29,7 +29,9 @@ class AgedMark:
 
 
 def aged(mass: Any, age: Any, surface: SurfaceRecord | Liquid, drying: Any, rain: Any, temperature: Any) -> AgedMark:
-    """A mark of some mass [kg/m²] at an age [s].
+    """A mark of some mass [kg/m²] at an age [s], as wet as the air leaves what rain does not wash off.
+
+    Rates times the age are all that counts, so that it may be in frames, and the rates for each frame.
 
     Parameters
     ----------
@@ -39,7 +41,9 @@ def aged(mass: Any, age: Any, surface: SurfaceRecord | Liquid, drying: Any, rain
         Of the floor [°C].
     """
     assert surface.carried is not None
-    water = np.maximum(mass, THINNEST) * (surface.carried.water / weather.WATER_DENSITY)
+    fallen = age * rain * (MILLIMETRES_PER_HOUR * 1e3)
+    remaining = mass * np.exp(fallen * -WASH_OFF)
+    water = np.maximum(remaining, THINNEST) * (surface.carried.water / weather.WATER_DENSITY)
     passed, melted = age, 0.0
     if surface.melts:
         rate = weather.melting_rate(temperature)
@@ -47,6 +51,5 @@ def aged(mass: Any, age: Any, surface: SurfaceRecord | Liquid, drying: Any, rain
         melted = np.minimum(melts / water, 1.0)
         passed = np.maximum(melts - water, 0.0) / np.maximum(rate, SLOWEST)
     lost = passed * np.maximum(drying - rain, 0.0) * MILLIMETRES_PER_HOUR
-    fallen = age * rain * (MILLIMETRES_PER_HOUR * 1e3)
     wet = weather.wetness(lost / water * weather.SURFACE_FILM)
-    return AgedMark(mass * np.exp(fallen * -WASH_OFF), wet, melted)
+    return AgedMark(remaining, wet, melted)

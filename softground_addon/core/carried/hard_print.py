@@ -19,8 +19,9 @@ from ..soles.patch_maps import Nodes, covered_fraction, distance_beyond
 from ..soles.undersides import lowest_surface
 from .film import zone_of
 
-ALONG_SOLE = 13
-"""Nodes of the grid along a sole: 2.3 cm for an adult, 10 kB a step in a file. The outline between them is that of the
+ALONG_SOLE = 11.5
+"""Cells of the grid along a sole, no even number, so that no node is right on a straight outline: 2.6 cm for an adult,
+10 kB a step in a file. The outline between them is that of the
 distances to it."""
 ACROSS_PROP = 24
 """Nodes along a cube as large as a wheel, a ball or a hand."""

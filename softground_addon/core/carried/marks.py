@@ -32,6 +32,8 @@ from .hard_print import HardPrint, SoleGrid, laid, prop_spacing, sole_grid, swep
 
 LOOKED_AT = 32
 """Steps of a contact at which it is looked at, about."""
+AT_ONCE = 20
+"""Faces of a mark that are shown together: a third of a shoe, three rows of a tyre."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,23 @@ class Marks:
     floors: FloorSteps
     carried: CarriedMass = field(default_factory=CarriedMass)
 
+    def in_turn(self) -> Marks:
+        """The same marks in pieces that are there at once: faces that share vertices have one birth, the latest."""
+        step, latest = self.step[self.faces[:, 0]], self.birth[self.faces].max(axis=1)
+        order = np.lexsort((latest, step))
+        ahead = np.searchsorted(step[order], step[order])
+        same = np.concatenate([[True], (np.diff(latest[order]) != 0) | (np.diff(step[order]) != 0)])
+        rank = np.maximum.accumulate(np.where(same, np.arange(len(order)), 0)) - ahead
+        piece = np.empty_like(step)
+        piece[order] = np.cumsum(np.concatenate([[0], np.diff(step[order] * len(order) + rank // AT_ONCE) != 0]))
+        birth = np.zeros(piece.max(initial=-1) + 1)
+        np.maximum.at(birth, piece, latest)
+        corners, faces = np.unique(self.faces * len(birth) + piece[:, None], return_inverse=True)
+        vertex, piece = np.divmod(corners, len(birth))
+        parts = {name: getattr(self, name)[vertex] for name in OF_VERTEX if name != "birth"}
+        parts["area"] = parts["area"] / np.bincount(vertex)[vertex]
+        return replace(self, faces=faces.reshape(-1, 4), birth=birth[piece], **parts)
+
     def with_steps(self, steps: Sequence[EditableStep], shed: Mapping[int, float]) -> Marks:
         """The same marks with the mass that they have after other steps on the soft ground; see `FloorSteps.films`."""
         films, booked = self.floors.films(steps, shed)
@@ -113,6 +132,8 @@ class _Under:
         return np.stack([along / self.bare.length - 0.5, left, np.full(len(places), self.bare.breadth)], axis=-1)
 
 
+OF_VERTEX = ("position", "birth", "mass", "area", "sole", "tread", "pad", "step", "share", "zone")
+"""Fields of `Marks` that have a row for each vertex."""
 _Mark = dict[str, Any]
 """The faces of a mark, and the values of its vertices, as `Marks` has them."""
 _NOTHING: _Mark = {

@@ -65,6 +65,22 @@ def at(scene, frame):
     return shown(marks_object.of(scene.softground.ground))
 
 
+def there(mesh):
+    """Number of vertices of a mesh that are part of what can be seen."""
+    return len({number for face in mesh.polygons if face.area > 0 for number in face.vertices})
+
+
+def in_files(obj):
+    """Have marks play in the viewport as they do in renders and files."""
+    set_input(obj, "Attributes in Viewport", True)
+    return obj
+
+
+def read_input(obj, name):
+    modifier = obj.modifiers[0]
+    return compat.read_input(modifier, node_modifiers.inputs_of(modifier)[name])
+
+
 def set_input(obj, name, value):
     modifier = obj.modifiers[0]
     compat.write_input(modifier, node_modifiers.inputs_of(modifier)[name], value)
@@ -90,18 +106,23 @@ def test_marks_lie_on_the_crate_and_weigh_what_the_report_says(scene, baked):
 
 
 def test_marks_come_with_the_feet_in_any_order_of_frames(scene):
-    birth = values(marks_object.of(scene.softground.ground).data, "birth")
-    counts = {}
-    for frame in (84, 1, 40, 60, 50, 84, 1):
-        count = len(at(scene, frame).vertices)
-        assert count == np.count_nonzero(birth <= frame)
-        assert counts.setdefault(frame, count) == count
-    assert counts[1] == 0
-    assert 0 < counts[60] <= counts[84] == len(birth)
+    obj = marks_object.of(scene.softground.ground)
+    birth = values(obj.data, "birth")
+    for as_files in (False, True):
+        set_input(obj, "Attributes in Viewport", as_files)
+        counts = {}
+        for frame in (84, 1, 40, 60, 50, 84, 1):
+            mesh = at(scene, frame)
+            count = there(mesh)
+            assert count == np.count_nonzero(birth <= frame)
+            assert len(mesh.vertices) == (count if as_files else len(birth))
+            assert counts.setdefault(frame, count) == count
+        assert counts[1] == 0
+        assert 0 < counts[60] <= counts[84] == len(birth)
 
 
 def test_marks_dry_as_weather_dries_them(scene):
-    obj = marks_object.of(scene.softground.ground)
+    obj = in_files(marks_object.of(scene.softground.ground))
     set_input(obj, "Drying", 0.5)
     set_input(obj, "Time Scale", 600.0)
     mesh = at(scene, 84)
@@ -123,7 +144,7 @@ def with_uv_map(crate, scale=1.0):
 
 
 def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene, tmp_path):
-    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    obj, crate = in_files(marks_object.of(scene.softground.ground)), bpy.data.objects["Crate"]
     size = np.array(crate.dimensions)
     with_uv_map(crate)
     set_input(obj, "Drying", 0.5)
@@ -149,7 +170,7 @@ def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene,
 
 
 def test_images_have_the_sliders_of_their_frame_where_they_are_keyed(scene):
-    obj, crate = marks_object.of(scene.softground.ground), bpy.data.objects["Crate"]
+    obj, crate = in_files(marks_object.of(scene.softground.ground)), bpy.data.objects["Crate"]
     with_uv_map(crate)
     set_input(obj, "Time Scale", 600.0)
     modifier = obj.modifiers[0]
@@ -214,7 +235,7 @@ def test_images_have_marks_whose_faces_the_user_has_split_or_deleted(scene):
 
 
 def test_rain_keeps_marks_wet_and_washes_them_off(scene):
-    obj = marks_object.of(scene.softground.ground)
+    obj = in_files(marks_object.of(scene.softground.ground))
     before = values(at(scene, 84), "mass")
     set_input(obj, "Drying", 0.5)
     set_input(obj, "Rain", 20.0)
@@ -233,11 +254,12 @@ def test_they_play_without_the_add_on(scene, baked):
         "s, o = bpy.context.scene, bpy.data.objects['SoftGround Marks']\n"
         "for f in (84, 1, 60):\n    s.frame_set(f)\n"
         "    graph = bpy.context.evaluated_depsgraph_get()\n"
-        "    print('count', f, len(o.evaluated_get(graph).data.vertices))\n"
+        "    faces = o.evaluated_get(graph).data.polygons\n"
+        "    print('count', f, len({v for p in faces if p.area > 0 for v in p.vertices}))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     counts = {int(f): int(n) for f, n in re.findall(r"count (\d+) (\d+)", done.stdout)}
-    assert counts == {frame: len(at(scene, frame).vertices) for frame in (84, 1, 60)}
+    assert counts == {frame: there(at(scene, frame)) for frame in (84, 1, 60)}
 
 
 def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
@@ -249,6 +271,7 @@ def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
     obj.data.materials[0] = mine
     set_input(obj, "Drying", 3.0)
     before = mesh_arrays.positions(obj.data)
+    assert not read_input(obj, "Attributes in Viewport")
     bake(scene)
     again = marks_object.of(ground)
     assert again == obj
@@ -256,6 +279,7 @@ def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
     assert again.hide_render
     assert again.location.z == pytest.approx(HEIGHT + 0.3e-3 + 0.5, abs=1e-3)
     assert again.data.materials[0] == mine
+    assert read_input(again, "Attributes in Viewport")  # which mine may read
     modifier = again.modifiers[0]
     assert compat.read_input(modifier, node_modifiers.inputs_of(modifier)["Drying"]) == 3.0
     bpy.ops.softground.clear_bake()
@@ -348,12 +372,12 @@ def edit(scene, edits):
 
 
 def state_of(obj):
-    return mesh_arrays.positions(obj.data), np.maximum(values(obj.data, "mass"), 0.0)
+    return mesh_arrays.positions(obj.data), values(obj.data, "mass")
 
 
 def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(scene):
     obj, frame = marks_object.of(scene.softground.ground), 84
-    before, count = state_of(obj), len(at(scene, frame).vertices)
+    before, count = state_of(obj), there(at(scene, frame))
     names = [step.name for step in baked_ground.steps_of(scene.softground.ground)]
     edit(scene, {names[0]: StepEdit(mute=True)})
     fewer = state_of(obj)
@@ -365,11 +389,11 @@ def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(sce
     assert carried["picked_up"] == pytest.approx(sum(carried.values()) - carried["picked_up"], abs=1e-9)
     edit(scene, {name: StepEdit(mute=True) for name in names})
     assert not state_of(obj)[1].any()
-    assert len(at(scene, frame).vertices) == 0
+    assert there(at(scene, frame)) == 0
     edit(scene, {})
     assert state_of(obj)[1] == pytest.approx(before[1], abs=1e-6)
     assert state_of(obj)[0] == pytest.approx(before[0], abs=1e-6)
-    assert len(at(scene, frame).vertices) == count
+    assert there(at(scene, frame)) == count
 
 
 def test_marks_in_edit_mode_refuse_bakes_edits_and_clear_and_nothing_changes(scene):
@@ -423,7 +447,7 @@ def test_marks_of_steps_that_are_moved_are_those_of_another_bake(scene, change):
 )
 def test_files_of_other_programs_hold_the_marks_of_each_frame(scene, tmp_path, suffix, write, read):
     ground = scene.softground.ground
-    counts = {frame: len(at(scene, frame).vertices) for frame in (60, 84)}
+    counts = {frame: there(at(scene, frame)) for frame in (60, 84)}
     path = tmp_path / f"shot.{suffix}"
     write(ground, path, 58, 84)
     known = set(bpy.data.objects)

@@ -48,6 +48,22 @@ def mass_of_steps(laid_marks):
     return np.bincount(laid_marks.step, laid_marks.mass * laid_marks.area)
 
 
+def test_faces_that_share_vertices_are_there_at_once_and_weigh_the_same():
+    whole = marks()
+    cut = whole.in_turn()
+    births = cut.birth[cut.faces]
+    assert (np.ptp(births, axis=1) == 0).all()
+    latest = whole.birth[whole.faces].max(axis=1)
+    assert (births[:, 0] >= latest).all()
+    for step in np.unique(whole.step):
+        of_step = whole.step[whole.faces[:, 0]] == step
+        assert births[of_step].min() < births[of_step].max() == latest[of_step].max()
+    assert (cut.position[cut.faces] == whole.position[whole.faces]).all()
+    assert (cut.step[cut.faces] == whole.step[whole.faces]).all()
+    assert cut.mass @ cut.area == pytest.approx(whole.mass @ whole.area, rel=1e-12)
+    assert len(cut.mass) < 1.5 * len(whole.mass)
+
+
 @pytest.mark.parametrize("force", [5.0, 800.0, 3000.0])
 def test_an_elastic_sole_bears_the_force_whatever_its_shape(force):
     chance = np.random.default_rng(1)
