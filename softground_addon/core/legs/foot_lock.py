@@ -30,10 +30,15 @@ MOST = 0.8
 AXLE = 0.01
 """Points that bear within about this distance of each other are an axle, about which the foot may turn, in lengths."""
 TWIST = np.radians(25.0)
-"""A foot that turns by more than this in one contact keeps its turn, about those of its bearing points that are nearest
-to its front, or to its rear end if that is the calmer one [rad]."""
-PIVOT = 0.05
-"""Distance from there at which a point counts 1/e as much, in sole lengths."""
+"""A foot that turns by more than this in one contact keeps its turn, about the place along it that is calmest as it
+turns [rad]."""
+PLACES = 21
+"""Places along a sole of which one is the calmest..."""
+STRIP = 0.05
+"""...each the mean of the points about it, of which those at this distance count 1/e as much, in sole lengths."""
+OFF_FLOOR = 0.1
+"""A foot turns about its calmest place while that is no higher than this above the lowest point, in sole lengths; from
+twice as high on, about the points that bear."""
 TRAVEL = 0.15
 """A foot that goes so far along the floor in a burst is meant to go there, in leg lengths (14 cm for an adult)."""
 FARTHEST = 0.5
@@ -148,15 +153,26 @@ def eased(middle: Array, turn: Array, move: Array, touching: Mask) -> Array:
 
 def _steps(sole: Underside, during: slice, weight: Array) -> tuple[Array, Array, bool]:
     """Turns (K - 1,) and shifts (K - 1, 2) that bring each frame's bearing points back to where they were in the frame
-    before, and True if the foot turns on purpose."""
+    before, and True if the foot turns on purpose: then the shifts alone do, of the foot turned back about its pivot."""
     points, both = sole.points[during, :, :2], _bearing_in_both(weight)
-    turns, shifts = _fitted(points[1:], points[:-1], both, AXLE * sole.length)
-    if abs(turns.sum()) <= TWIST:
-        return turns, shifts, False
-    ends = points[:, [sole.along.argmin(), sole.along.argmax()]]
-    rear, front = np.abs(turns) @ np.linalg.norm(np.diff(ends, axis=0), axis=-1)
-    beside = sole.along if rear < front else 1.0 - sole.along
-    return (*_fitted(points[1:], points[:-1], both * np.exp(-beside / PIVOT), np.inf), True)
+    back = _fitted(points[1:], points[:-1], np.ones_like(both), 0.0)[0]
+    if abs(back.sum()) <= TWIST:
+        return (*_fitted(points[1:], points[:-1], both, AXLE * sole.length), False)
+    bearing = np.einsum("kq,kqi->ki", both / both.sum(axis=1, keepdims=True), points[1:])
+    arm = _pivot(sole, during, bearing, np.abs(back)) - bearing
+    shifts = _fitted(points[1:], points[:-1], both, np.inf)[1]
+    return 0.0 * back, shifts - (arm - turned_level(back, arm)), True
+
+
+def _pivot(sole: Underside, during: slice, bearing: Array, turning: Array) -> Array:
+    """Place (K - 1, 2) about which a foot turns by angles (K - 1,) in each step: the one along it that moves least as
+    it turns, or what bears (K - 1, 2) while that is off the floor."""
+    near = np.exp(-np.abs(sole.along - np.linspace(0.0, 1.0, PLACES)[:, None]) / STRIP)
+    places = np.einsum("pq,kqi->kpi", near / near.sum(axis=1, keepdims=True), sole.points[during])
+    calmest = int((turning @ np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1)).argmin())
+    height = near[calmest] @ sole.heights[during].T / near[calmest].sum() - sole.lowest()[during]
+    rests = np.clip(2.0 - height / (OFF_FLOOR * sole.length), 0.0, 1.0)[1:, None]
+    return np.asarray(bearing + rests * (places[1:, calmest, :2] - bearing))
 
 
 def rolled(points: Array, weight: Array) -> Array:

@@ -86,6 +86,35 @@ def test_a_foot_that_turns_on_its_heel_or_toes_and_skates_stays_where_these_firs
     assert farthest(locked(rim, TOUCHING).points) < 0.01
 
 
+def rounded(turn, radius=0.08):
+    """The rim of a sole with a rounded toe, turned (F, 3, 3) about where the round begins, on level floor."""
+    angle = np.linspace(0.0, 0.5 * np.pi, 40)
+    toe = np.stack([radius * np.sin(angle), 0 * angle, radius * (1.0 - np.cos(angle))], axis=-1)
+    flat = np.stack([np.linspace(radius - LENGTH, 0.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
+    rest = np.concatenate([part + np.array((0.0, y, 0.0)) for part in (flat, toe) for y in (-0.04, 0.04)])
+    points = rest @ np.swapaxes(turn, -1, -2)
+    heights = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    return Underside(points, heights, np.zeros(len(rest), int), LENGTH, (rest[:, 0] + LENGTH - radius) / LENGTH)
+
+
+@pytest.mark.parametrize("place", [0.7, 0.85])
+def test_a_foot_that_turns_on_its_ball_as_its_heel_rises_stays_there_and_not_with_its_tip(place):
+    """As of a step that turns the body about: it rolls over its rounded toes meanwhile, and has skated before."""
+    rim = rounded(level(np.radians(84.0) * PART**2) @ pitched(np.radians(35.0) * PART**2))
+    ball = np.abs(rim.along - place).argmin()
+    skates = np.stack([0.01 * (1.0 - PART) ** 3, 0.03 * (1.0 - PART) ** 3, 0 * PART], axis=-1)
+    points = rim.points + (skates - rim.points[:, ball] * (1, 1, 0))[:, None]
+    rim = replace(rim, points=points)
+    near = np.abs(rim.along - place) < 0.06
+
+    def farthest(points):
+        middle = points[:, near, :2].mean(axis=1)
+        return np.linalg.norm(middle - middle[0], axis=1).max()
+
+    assert farthest(rim.points) > 0.02
+    assert farthest(locked(rim, TOUCHING).points) < 0.01
+
+
 def test_between_contacts_the_correction_passes_smoothly_from_one_to_the_next():
     touching = (PART < 0.3) | (PART > 0.7)
     rim = sole((level(0 * PART), np.stack([0.1 * PART, 0 * PART, 0 * PART], axis=-1)))
@@ -103,12 +132,6 @@ def test_without_a_contact_nothing_moves():
 
 @pytest.mark.parametrize("frames", [4, 8, 16])
 def test_a_sole_that_rolls_over_a_rounded_toe_does_not_creep(frames):
-    radius, touching = 0.08, np.ones(frames, bool)
-    turn, angle = pitched(np.radians(60.0) * np.linspace(0.0, 1.0, frames) ** 2), np.linspace(0.0, 0.5 * np.pi, 40)
-    toe = np.stack([radius * np.sin(angle), 0 * angle, radius * (1.0 - np.cos(angle))], axis=-1)
-    flat = np.stack([np.linspace(radius - LENGTH, 0.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
-    rest = np.concatenate([part + np.array((0.0, y, 0.0)) for part in (flat, toe) for y in (-0.04, 0.04)])
-    points = rest @ np.swapaxes(turn, -1, -2)
-    heights = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-    rolling = Underside(points, heights, np.zeros(len(rest), int), LENGTH, rest[:, 0] / LENGTH)
+    touching = np.ones(frames, bool)
+    rolling = rounded(pitched(np.radians(60.0) * np.linspace(0.0, 1.0, frames) ** 2))
     assert slides(locked(rolling, touching), touching).max() < 3e-4
