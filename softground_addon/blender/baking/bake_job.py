@@ -333,11 +333,12 @@ def _given(
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    coarse = yield from meanwhile(Progress("write", 0.1), trail_detail.surface_of.slices(ground, unit_scale, frame))
+    reading = trail_detail.coarsest.slices(name, surface, unit_scale, frame)
+    coarse, level = yield from meanwhile(Progress("write", 0.1), reading)
     refinement = yield from meanwhile(
         Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
-    drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement)
+    drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)
     drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement

@@ -108,7 +108,7 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
 
 LONGEST_OF_LIMBS = 0.55
 """Length from which a limb or an object counts as no longer, since it prints with a part of itself [m]: cells of 1 cm
-along a preset's 55."""
+along a preset's 55. Limbs of giants count as their shortest foot: what shows that shows them."""
 
 _POSES = 16
 """Poses of an animation from which soles are measured."""
@@ -135,8 +135,9 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
     except InputError:  # it says so when the user bakes
         return 0.0
     limbs = {sole.name for sole in mapping.soles if sole.limb}
-    lengths = ((sole.sole.name in limbs, sole.sole.length) for sole in motion.soles)
-    return shortest_length(min(length, LONGEST_OF_LIMBS) if is_limb else length for is_limb, length in lengths)
+    lengths = [(sole.sole.name in limbs, sole.sole.length) for sole in motion.soles]
+    longest = max(LONGEST_OF_LIMBS, min((length for is_limb, length in lengths if not is_limb), default=0.0))
+    return shortest_length(min(length, longest) if is_limb else length for is_limb, length in lengths)
 
 
 def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:

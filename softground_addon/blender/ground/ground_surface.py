@@ -232,11 +232,13 @@ def stand_in(
     weather_at: int | None = None,
     weather: bpy.types.NodeTree | None = None,
     with_users: bool = True,
+    level: int = 0,
 ) -> Iterator[bpy.types.Object]:
     """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
 
     Modifiers that change over time are evaluated at the first frame of the bake, or at one at which the copy is to be
-    under weather, its own or another group's. Those of the user may be left out.
+    under weather, its own or another group's. Those of the user may be left out. Where a level is given, the last
+    of them subdivides so often (see `subdivision`).
     """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     for shown_in in ground.users_scene[:1]:
@@ -258,6 +260,8 @@ def stand_in(
             for unwanted in (playback.modifier_of(copy), its_weather if weather_at is None else None, *users):
                 if unwanted:
                     copy.modifiers.remove(unwanted)
+            if level:
+                subdivision(copy).levels = level
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
         layer.update()
@@ -267,13 +271,19 @@ def stand_in(
         remove_scene(scene)
 
 
+def subdivision(ground: bpy.types.Object) -> Any:
+    """The modifier that subdivides the ground; None where others come after it, which may need its vertices."""
+    shown = [modifier for modifier in users_modifiers(ground) if modifier.show_viewport]
+    return shown[-1] if shown and shown[-1].type == "SUBSURF" else None
+
+
 @contextmanager
 def undisturbed_copy(
-    ground: bpy.types.Object, moved: Indices | None = None, by: Array | None = None
+    ground: bpy.types.Object, moved: Indices | None = None, by: Array | None = None, *, level: int = 0
 ) -> Iterator[bpy.types.Mesh]:
     """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake.
 
-    Vertices of its mesh (K,) may be moved, by as much (3,) in its own space and units.
+    Vertices of its mesh (K,) may be moved, by as much (3,) in its own space and units. `level` as of `stand_in`.
     """
     mesh = mesh_of(ground).copy()
     try:
@@ -283,7 +293,7 @@ def undisturbed_copy(
         display_key.drop_all(mesh)
         write_positions(mesh, rest)
         if any(modifier.show_viewport for modifier in users_modifiers(ground)):
-            with stand_in(ground, mesh) as evaluated:
+            with stand_in(ground, mesh, level=level) as evaluated:
                 yield mesh_of(evaluated)
         else:
             yield mesh

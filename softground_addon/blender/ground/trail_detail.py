@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.ground.terrain import MeshTerrain
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
 from ...core.motion.ground_frame import GroundFrame
@@ -21,8 +22,9 @@ from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import playback
-from ..settings import exists, find, name_of
+from ..settings import exists, find, name_of, resolve
 from . import ground_mesh, ground_surface, refined_mesh
+from .ground_surface import GroundSurface
 from .hidden_ground import hide, hides, may_hide, show_again
 
 DETAIL = "softground_detail"
@@ -61,9 +63,33 @@ def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
 
 
 @sliced
-def surface_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Slices[Surface]:
+def coarsest(
+    name: ObjectName, seen: GroundSurface | None, unit_scale: float, frame: GroundFrame | None = None
+) -> Slices[tuple[Surface, int]]:
+    """The faces of a ground, subdivided no more often than its shape needs, and how often; 0 for as it is seen.
+
+    From the first subdivision on vertices lie on one surface, so that only what is between them may be off.
+    """
+    modifier = ground_surface.subdivision(resolve(name)) if seen else None
+    for level in range(1, modifier.levels if modifier else 0):
+        coarse = yield from surface_of.slices(resolve(name), unit_scale, frame, level)
+        shape = yield from MeshTerrain.from_mesh.slices(coarse.vertices, coarse.triangle_vertices)
+        assert seen is not None
+        for part in ground_surface.parts_of(seen.surface_vertices):
+            yield
+            if (np.abs(shape.heights(*part.T[:2]) - part[:, 2]) > FLOOR).any():
+                break
+        else:
+            return coarse, level
+    return (yield from surface_of.slices(resolve(name), unit_scale, frame)), 0
+
+
+@sliced
+def surface_of(
+    ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None, level: int = 0
+) -> Slices[Surface]:
     """The faces of the ground as its modifiers leave it, in the world or a frame [m]; all is read at first."""
-    with ground_surface.undisturbed_copy(ground) as source:
+    with ground_surface.undisturbed_copy(ground, level=level) as source:
         faces = mesh_arrays.read_faces(source)
         to_world = ground_surface.to_world_of(ground, unit_scale, frame)
     yield
@@ -71,8 +97,12 @@ def surface_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame |
 
 
 @sliced
-def draft(drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Slices[ObjectName]:
+def draft(
+    drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinement: Refinement, level: int = 0
+) -> Slices[ObjectName]:
     """The refined ground as an object that is in no scene yet; one that is not published goes as `drafts` close.
+
+    `level` is that of its surface (see `coarsest`).
 
     Raises
     ------
@@ -86,7 +116,7 @@ def draft(drafts: ExitStack, ground: bpy.types.Object, surface: Surface, refinem
         )
     with none_left_if_it_fails():
         mesh = bpy.data.meshes.new(f"{ground.name} Trail")
-        with ground_surface.undisturbed_copy(ground) as source:
+        with ground_surface.undisturbed_copy(ground, level=level) as source:
             for material in source.materials:
                 mesh.materials.append(material and material.original)  # an evaluated mesh holds evaluated materials
             carried = refined_mesh.read(source, [group.name for group in ground.vertex_groups])

@@ -126,10 +126,11 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
             ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame
         ):
-            coarse = yield from meanwhile(PLACING, trail_detail.surface_of.slices(ground, unit_scale, frame))
+            reading = trail_detail.coarsest.slices(name, shot.surface, unit_scale, frame)
+            coarse, level = yield from meanwhile(PLACING, reading)
             region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
             refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
-            drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement)
+            drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)
             drafted = yield from meanwhile(PLACING, drafting)
             vertices = refinement.at_vertices(coarse, coarse.vertices)
             looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import bpy
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import jobs
+from softground_addon.blender.characters import character_setup
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.recognition import recognise
 from softground_addon.blender.rigs.rig_mapping import map_rig
@@ -173,6 +175,24 @@ def test_a_fingertip_on_the_ground_does_not_size_the_cells(scene):
     assert "Root" in {sole.bone for sole in character.soles}
     assert 0.02 < character.sole_length < 0.05
     assert scene.softground.cell_size > 0.02 / scene.softground.cells_along_sole
+
+
+def test_the_tail_of_a_giant_asks_for_no_finer_cells_than_its_feet(scene, monkeypatch):
+    """A tail prints with a part of itself, whose length nothing tells; feet of metres tell what shows the giant."""
+    armature = stool()
+    box("tail", 0.03, (0, 0.1, 0.075), armature, "Root")
+    rigs.key(armature, "location", {1: (0, 0, 0), FRAMES: (0.002, 0, 0)}, bone="Root")
+
+    def with_a_limb(*shot):
+        recognised = yield from recognise(*shot)
+        soles = tuple(replace(sole, limb=sole.bone == "Root") for sole in recognised.mapping.soles)
+        return replace(recognised, mapping=replace(recognised.mapping, soles=soles))
+
+    monkeypatch.setattr(character_setup, "recognise", with_a_limb)
+    small = add_character(scene, armature).sole_length
+    scene.softground.characters.clear()
+    armature.scale = (50.0,) * 3
+    assert add_character(scene, armature).sole_length == pytest.approx(50 * small, rel=0.02)
 
 
 def test_a_limb_lies_where_its_skin_does_though_other_bones_bend_it(scene):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_surface, refined_mesh, trail_detail
-from softground_addon.blender.settings import resolve
+from softground_addon.blender.settings import name_of, resolve
+from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.meshing.refinement import refine
 from softground_addon.core.meshing.region import Region
 from softground_addon.core.numerics.cell_keys import keys_of
@@ -219,6 +220,29 @@ def test_the_surface_between_vertices_is_the_evaluated_one(scene):
     assert not detail.modifiers
     in_source, in_target = sample_in_source(shown, detail.data, "position")
     assert np.abs(in_target - in_source).max() < 1e-4
+
+
+@pytest.mark.parametrize("and_then", ["", "DISPLACE"])
+def test_beside_the_trail_a_ground_is_subdivided_no_more_often_than_its_shape_needs(scene, and_then):
+    ground = coarse_ground(scene)
+    ground.modifiers.new("Smooth", "SUBSURF").levels = 6
+    if and_then:
+        ground.modifiers.new("Rough", and_then).strength = 0.0
+    seen = ground_surface.undisturbed_surface(ground, 1.0)
+    surface, level = trail_detail.coarsest(name_of(ground), seen, 1.0)
+    assert level == (0 if and_then else 4)  # quads of 6 cm on a curve of 17 m leave it by 0.03 mm, of 12 cm by 0.12
+    with ExitStack() as drafts:
+        draft = trail_detail.draft(drafts, ground, surface, refine(surface, region(), 0.02), level)
+        detail = trail_detail.publish(ground, resolve(draft))
+    assert ground.modifiers["Smooth"].levels == 6
+    assert (len(detail.data.vertices) < len(seen.surface_vertices) / 6) == (not and_then)
+    detail.data.calc_loop_triangles()
+    corners = np.array([triangle.vertices for triangle in detail.data.loop_triangles])
+    shown = MeshTerrain.from_mesh(points(detail.data).astype(float), corners)
+    x, y, z = seen.surface_vertices.T
+    off = np.abs(shown.heights(x, y) - z)
+    assert np.isnan(off).mean() < 0.01  # the rounded corners
+    assert np.nanmax(off) < trail_detail.FLOOR
 
 
 def test_loose_edges_and_vertices_stay(scene):
