@@ -42,6 +42,10 @@ class SOFTGROUND_OT_add_ground(OnMeshes, OnGround, bpy.types.Operator):
             further_grounds.add(options, obj)
         names = ", ".join(repr(obj.name) for obj in chosen)
         self.report({"INFO"}, translated("Soles print in {names} too", names=names))
+        heard = bake_report.baked_grounds(options)
+        for obj in [obj for obj in settings.grounds_of(options) if baked_ground.is_baked(obj) and obj not in heard]:
+            text = "The bake on '{name}' is older, and left out of sound and events: bake again"
+            self.report({"WARNING"}, translated(text, name=obj.name))
         return {"FINISHED"}
 
 
