@@ -114,6 +114,8 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         grounds = settings.listed_grounds(scene.softground)
+        if self.only_shown and grounds[1:] and not baked_ground.has_remains(grounds[0]):
+            raise InputError(f"There is no bake on ground '{grounds[0].name}': show another one, or clear all of them.")
         _clear(scene, grounds[:1] if self.only_shown else grounds)
         if self.only_shown and grounds[1:]:
             return {"FINISHED"}

@@ -194,6 +194,15 @@ def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
     assert fingerprints.of_file() == before
 
 
+def test_clear_of_the_ground_shown_says_so_where_that_has_no_prints(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.clear_bake(only_shown=True)
+    assert "There is no bake on ground 'Field'" in refusal(lambda: bpy.ops.softground.clear_bake(only_shown=True))
+    assert baked_ground.is_baked(crate)
+
+
 def test_the_depth_is_predicted_on_all_of_them(crate):
     scene = bpy.context.scene
     also(crate)
