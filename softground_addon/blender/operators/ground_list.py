@@ -42,6 +42,10 @@ class SOFTGROUND_OT_add_ground(OnMeshes, OnGround, bpy.types.Operator):
             further_grounds.add(options, obj)
         names = ", ".join(repr(obj.name) for obj in chosen)
         self.report({"INFO"}, translated("Soles print in {names} too", names=names))
+        heard = bake_report.baked_grounds(options)
+        for obj in [obj for obj in settings.grounds_of(options) if baked_ground.is_baked(obj) and obj not in heard]:
+            text = "The bake on '{name}' is older, and left out of sound and events: bake again"
+            self.report({"WARNING"}, translated(text, name=obj.name))
         return {"FINISHED"}
 
 
@@ -110,6 +114,8 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         grounds = settings.listed_grounds(scene.softground)
+        if self.only_shown and grounds[1:] and not baked_ground.has_remains(grounds[0]):
+            raise InputError(f"There is no bake on ground '{grounds[0].name}': show another one, or clear all of them.")
         _clear(scene, grounds[:1] if self.only_shown else grounds)
         if self.only_shown and grounds[1:]:
             return {"FINISHED"}

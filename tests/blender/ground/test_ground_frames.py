@@ -8,9 +8,12 @@ import pytest
 from mathutils import Euler, Matrix, Vector
 
 from sample_scenes import stage
+from sample_scenes.body import Body
+from sample_scenes.gait import Gait, walk
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
 from softground_addon.blender.characters.prop_setup import add_props
+from softground_addon.blender.compat import action_curves
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.live import live
@@ -25,6 +28,7 @@ from softground_addon.core.record.edits import StepEdit
 from tests.blender.baking.test_props import ball, dropped_path, key_path
 from tests.blender.ground.test_hard_ground import box
 from tests.blender.grounds import as_rendered, bake, field
+from tests.blender.response.test_root_motion import FRAMES, on_the_spot
 
 MAP = (548000.0, 5932000.0, 0.0)
 WHERE = {
@@ -241,6 +245,32 @@ def test_hard_steps_are_heard_from_where_they_are_in_the_world(short_walk, tmp_p
         there = [other["position"] for other in baked_ground.events_of(ground) if other["frame"] == row["frame"]]
         apart = np.linalg.norm(np.array(seen)[:, None] - np.array(there), axis=2).min()
         assert apart < (1e-3 if where == "sails" else 1.0), "single precision"
+
+
+def test_a_walk_on_the_spot_on_a_belt_prints_as_the_walk_that_goes_ahead(scene):
+    armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
+    scene.softground.cell_size = 0.02
+    ground = field(scene, size=12.0)
+    prints = {}
+    for runs in (False, True):
+        carrier = bpy.data.objects.new("Carrier", None)
+        scene.collection.objects.link(carrier)
+        (ground if runs else armature).parent = carrier
+        for frame in (1, FRAMES):
+            carrier.location.y = (1.0 if runs else -1.0) * Gait().speed * (frame - 1) / 24
+            carrier.keyframe_insert("location", frame=frame)
+        for curve in action_curves(carrier.animation_data.action):
+            for key in curve.keyframe_points:
+                key.interpolation = "LINEAR"
+        scene.frame_set(1)
+        result = bake(scene)
+        assert result.report["warnings"] == []
+        prints[runs] = [(*step.position, step.max_depth_m, step.compressed_m3) for step in result.footprints]
+        bpy.ops.softground.clear_bake()
+        bpy.data.objects.remove(carrier)
+        scene.frame_set(1)
+    assert len(prints[True]) > 3
+    np.testing.assert_allclose(prints[True], prints[False], rtol=1e-3, atol=1e-5)
 
 
 def props_on(scene, keyed):

@@ -194,6 +194,15 @@ def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
     assert fingerprints.of_file() == before
 
 
+def test_clear_of_the_ground_shown_says_so_where_that_has_no_prints(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.clear_bake(only_shown=True)
+    assert "There is no bake on ground 'Field'" in refusal(lambda: bpy.ops.softground.clear_bake(only_shown=True))
+    assert baked_ground.is_baked(crate)
+
+
 def test_the_depth_is_predicted_on_all_of_them(crate):
     scene = bpy.context.scene
     also(crate)
@@ -757,7 +766,9 @@ def test_a_printed_ground_that_is_deleted_is_forgotten_at_once_and_undo_brings_b
     assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
 
 
-def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_no_sound(crate, tmp_path, monkeypatch):
+def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_no_sound(
+    crate, tmp_path, monkeypatch, capfd
+):
     scene, heard = bpy.context.scene, []
     options, floor = scene.softground, scene.softground.ground
     also(crate)
@@ -766,6 +777,7 @@ def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_n
     options.hard_grounds.add().object = crate
     report = bake(scene).report
     bpy.ops.softground.add_ground(object=CRATE)
+    assert "The bake on 'Crate' is older, and left out of sound and events: bake again" in capfd.readouterr().out
     assert baked_ground.is_baked(crate)
     assert bake_report.baked_grounds(options) == [floor]
     rows = event_points.events_on(bake_report.baked_grounds(options))
