@@ -96,10 +96,11 @@ def counted(
 
 def meanwhile(state: State, slices: Slices[Result]) -> Generator[State, None, Result]:
     """A computation that knows nothing of Blender, in slices; before each, the job yields the same state."""
-    while True:
-        yield state
-        try:
-            next(slices)
-        except StopIteration as end:
-            result: Result = end.value
-            return result
+    with closing(slices):
+        while True:
+            yield state
+            try:
+                next(slices)
+            except StopIteration as end:
+                result: Result = end.value
+                return result

@@ -78,8 +78,10 @@ def is_deleted(ground: bpy.types.Object) -> bool:
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
-    """True if `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
-    return ground_mesh.has_remains(display_mesh_of(ground)) or hidden_ground.hides(ground)
+    """True if `clear` has something to take away: a bake, what is left of one that was deleted in part, or a table that
+    no plants give way by any more."""
+    shown = display_mesh_of(ground)
+    return ground_mesh.has_remains(shown) or hidden_ground.hides(ground) or trampling_table.is_idle(ground)
 
 
 def check_writable(ground: bpy.types.Object) -> None:

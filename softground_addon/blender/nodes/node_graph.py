@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,31 +10,46 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.numerics.slices import Slices, sliced
 from .arithmetic import Arithmetic
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
+SLICE = 0.1
+"""Time in which a part of a group is made, before whoever waits has a turn [s]."""
 
 
 class OtherGraphError(Exception):
     """A group has other nodes or links than those that it is to have."""
 
 
-def build(tree: Any, fill: Callable[[NodeGraph], None]) -> None:
+class _TurnError(Exception):
+    """The time of a slice is over before all nodes are made."""
+
+
+@sliced
+def build(tree: Any, fill: Callable[[NodeGraph], None]) -> Slices[None]:
     """Fill a group, in place of what is in it; where that has the same nodes and links, only numbers are set.
 
-    After each change Blender goes through the whole group, which takes seconds for one of some hundred nodes.
+    After each change Blender goes through the whole group, which takes seconds for one of some hundred nodes. Each
+    slice finds the nodes of those before it, in their order.
 
     Parameters
     ----------
     fill : callable
-        Makes the nodes of a graph, and finishes it.
+        Makes the nodes of a graph, and finishes it; always the same.
     """
     try:
         fill(NodeGraph(tree, known=True))
     except OtherGraphError:
         tree.nodes.clear()
-        fill(NodeGraph(tree))
+        while True:
+            yield
+            try:
+                fill(NodeGraph(tree, until=time.perf_counter() + SLICE))
+            except _TurnError:
+                continue
+            return
 
 
 class NodeGraph:
@@ -43,22 +59,25 @@ class NodeGraph:
     ----------
     known : bool
         True if it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
+        Otherwise it may have the first of them.
+    until : float, optional
+        Time by `perf_counter` after which no more than one node is made [s].
     """
 
-    def __init__(self, tree: Any, *, known: bool = False) -> None:
+    def __init__(self, tree: Any, *, known: bool = False, until: float = math.inf) -> None:
         self.tree = tree
         self._place = [0.0, 0.0]
         self._places: list[float] = []
-        self._known = iter(tree.nodes[:]) if known else None
+        self._is_known, self._until, self._is_late = known, until, False
+        self._nodes = iter(tree.nodes[:])
+        self._linked = {(link.from_socket, link.to_socket) for link in tree.links}
         self._made: dict[Hashable, Any] = {}
         self._links: set[tuple[Any, Any]] = set()
 
     def finish(self, geometry: Any) -> None:
         self.node("NodeGroupOutput", {"Geometry": geometry})
-        if self._known is not None:
-            links = {(link.from_socket, link.to_socket) for link in self.tree.links}
-            if next(self._known, None) is not None or links != self._links:
-                raise OtherGraphError
+        if self._is_known and (next(self._nodes, None) is not None or self._links != self._linked):
+            raise OtherGraphError
         # All at once: after each that is set on its own, Blender goes through the whole group.
         self.tree.nodes.foreach_set("location", self._places)
 
@@ -67,13 +86,11 @@ class NodeGraph:
 
     def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
         """A node with its properties set and its inputs, given by name or position, linked or set."""
-        if self._known is None:
-            node = self.tree.nodes.new(kind)
-            node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
-        else:
-            node = next(self._known, None)
-            if node is None or node.bl_idname != kind or node.mute:
-                raise OtherGraphError
+        node = next(self._nodes, None)
+        if node is None and not self._is_known:
+            node = self._new(kind)
+        elif node is None or node.bl_idname != kind or node.mute:
+            raise OtherGraphError
         self._places += self._place
         self._place[0] += COLUMN
         for name, value in properties.items():
@@ -88,10 +105,18 @@ class NodeGraph:
         if not isinstance(source, bpy.types.NodeSocket):
             if not _is(socket.default_value, source):
                 socket.default_value = source
-        elif self._known is None:
+            return
+        self._links.add((source, socket))
+        if not self._is_known and (source, socket) not in self._linked:
             self.tree.links.new(source, socket)
-        else:
-            self._links.add((source, socket))
+
+    def _new(self, kind: str) -> Any:
+        if self._is_late:
+            raise _TurnError
+        self._is_late = time.perf_counter() > self._until
+        node = self.tree.nodes.new(kind)
+        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
+        return node
 
     def _once(self, *key: Hashable, make: Callable[[], Any]) -> Any:
         """Nodes made for the same before, as the nodes of a file take more of it than thousands of vertices."""
@@ -144,7 +169,7 @@ class NodeGraph:
         node = self.node("GeometryNodeCaptureAttribute", domain=domain)
         names = [f"Value {count}" for count in range(len(numbers))]
         if [item.name for item in node.capture_items] != names:
-            if self._known is not None:
+            if self._is_known:
                 raise OtherGraphError
             for count, name in enumerate(names):
                 node.capture_items.new(kinds if isinstance(kinds, str) else kinds[count], name)

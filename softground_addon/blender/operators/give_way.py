@@ -10,50 +10,57 @@ from bpy.props import EnumProperty
 
 from ...core.errors import InputError
 from ...core.plants.tramplings import tramplings
-from .. import mesh_arrays, settings
+from .. import jobs, mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
-from ..operator_base import reports_errors
 from ..placement import hang_on
-from ..plants import give_way, meadow, trampling_table
+from ..plants import give_way, give_way_nodes, meadow, trampling_table
 from ..translation import translated
 from ..weather.ground_weather import damage_named
+from .modal_job import Reading, Reports
 
 
-class SOFTGROUND_OT_give_way(bpy.types.Operator):
+class SOFTGROUND_OT_give_way(Reading):
     """Let the selected plants or litter give way to the feet: hair curves, instances, meshes of loose blades. One
-    modifier behind yours; remove it, and all is as it was"""
+    modifier behind yours; remove it, and all is as it was. Esc cancels"""
 
     bl_idname = "softground.give_way"
     bl_label = "Give Way"
-    bl_options = {"REGISTER", "UNDO"}
 
     kind: EnumProperty(name="Kind", description="What gives way", items=give_way.KINDS, default="MEADOW")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the scene has a ground and the active object may give way: a redraw looks at no other."""
+        if not super().poll(context):
+            return False
         cls.poll_message_set(translated("Choose a ground, and select plants or litter on it"))
         ground, active = settings.options_of(context).ground, context.active_object
         if ground is None or active is None or not active.select_get() or context.mode != "OBJECT":
             return False
         return _may_give_way(active, ground)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        ground = settings.options_of(context).ground
-        chosen = [obj for obj in context.selected_objects if _may_give_way(obj, ground)]
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        ground = scene.softground.ground
+        chosen = [obj for obj in bpy.context.selected_objects if _may_give_way(obj, ground)]
         linked = next((obj for obj in chosen if obj.library), None)
         if linked is not None:
             raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
+        names = [settings.name_of(obj) for obj in (ground, *chosen)]
+        yield from _grouped(ground)
+        ground, *chosen = map(settings.resolve, names)
         _let(ground, chosen, self.kind)
         text = "{count} objects give way" if len(chosen) > 1 else "'{name}' gives way"
-        self.report({"INFO"}, translated(text, count=len(chosen), name=chosen[0].name))
-        return {"FINISHED"}
+        return [("INFO", translated(text, count=len(chosen), name=chosen[0].name))]
+
+
+def _grouped(ground: bpy.types.Object) -> jobs.Job[None]:
+    """Make the node group that plants on a ground give way by; nothing else is changed."""
+    ground_checks.check_writable(ground)
+    yield from jobs.meanwhile(jobs.Progress("write", 0.5), give_way_nodes.ensure_group.slices())
 
 
 def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str) -> None:
     """Let objects give way to the prints of a ground."""
-    ground_checks.check_writable(ground)
     renew_table(ground)
     table = trampling_table.ensure(ground)
     for obj in chosen:
@@ -79,24 +86,25 @@ def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
     return not is_ground or any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
 
 
-class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
-    """Let a meadow of hair curves grow around the prints, or on all of the ground before a bake. It gives way"""
+class SOFTGROUND_OT_add_sample_meadow(Reading):
+    """Let a meadow of hair curves grow around the prints, or on all of the ground before a bake. It gives way. Esc
+    cancels"""
 
     bl_idname = "softground.add_sample_meadow"
     bl_label = "Add Sample Meadow"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if the scene has a ground."""
+        if not super().poll(context):
+            return False
         cls.poll_message_set(translated("Choose or create a ground first"))
         ground = settings.options_of(context).ground
         return ground is not None and ground.type == "MESH" and context.mode == "OBJECT"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        ground = scene.softground.ground
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+        name = settings.name_of(scene.softground.ground)
+        ground = settings.resolve(name)
         unit_scale = settings.units_of(scene).unit_scale_m
         shown = baked_ground.display_mesh_of(ground)
         steps, about = baked_ground.load(ground) if baked_ground.is_baked(ground) else ([], {"inputs": {}})
@@ -105,6 +113,8 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
         corners = vertices[mesh_arrays.triangles(ground_mesh.mesh_of(shown))]
         if not len(corners):
             raise InputError(f"Ground '{ground.name}' has no faces that a meadow could grow on.")
+        yield from _grouped(ground)
+        ground = settings.resolve(name)
         near = np.array([step.position[:2] for step in steps]) if steps else None
         grass = meadow.grow(corners, unit_scale, near, _REACH)
         if frame:
@@ -112,8 +122,7 @@ class SOFTGROUND_OT_add_sample_meadow(bpy.types.Operator):
         for collection in ground.users_collection:
             collection.objects.link(grass)
         _let(ground, [grass], "MEADOW")
-        self.report({"INFO"}, translated("Added '{name}'", name=grass.name))
-        return {"FINISHED"}
+        return [("INFO", translated("Added '{name}'", name=grass.name))]
 
 
 _REACH = 1.0

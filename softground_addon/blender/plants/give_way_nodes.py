@@ -16,8 +16,9 @@ from typing import Any
 
 import bpy
 
+from ...core.numerics.slices import Slices, sliced
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
-from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
 from . import litter_nodes
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, META, PACE, SHARES, SINK, TILES, TIMES, VERSION
@@ -49,15 +50,20 @@ MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
 
-def ensure_group() -> Any:
+@sliced
+def ensure_group() -> Slices[Any]:
     """The node group of this version, made on first use."""
     known = next((group for group in bpy.data.node_groups if group.get(MARK) == VERSION and not group.library), None)
     if known is not None:
         return known
-    graph = NodeGraph(new_group(GROUP, MARK, INPUTS))
-    graph.tree[MARK] = VERSION
-    _fill(graph)
-    return graph.tree
+    tree = new_group(GROUP, MARK, INPUTS)
+    try:
+        yield from build.slices(tree, _fill)
+    except BaseException:
+        bpy.data.node_groups.remove(tree)
+        raise
+    tree[MARK] = VERSION
+    return tree
 
 
 def is_give_way(tree: Any) -> bool:

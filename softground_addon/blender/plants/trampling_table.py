@@ -49,6 +49,12 @@ def is_current(ground: bpy.types.Object) -> bool:
     return table is not None and table.data.get(layout.MARK) == layout.VERSION
 
 
+def is_idle(ground: bpy.types.Object) -> bool:
+    """True if a ground has a table, and its plants that gave way by it do no more: the ground alone refers to it."""
+    table = of(ground)
+    return table is not None and table.users <= 1
+
+
 def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
     """Write what soles trample to a ground's table, for plants that all play it by the group of this version."""
     with none_left_if_it_fails():
@@ -71,7 +77,7 @@ def clear(ground: bpy.types.Object) -> None:
     table = of(ground)
     if table is None:
         return
-    if any(table in _tables_of(obj) for obj in bpy.data.objects):
+    if not is_idle(ground):
         _exchange(table, bpy.data.meshes.new(NAME))
         return
     ground.pop(TRAMPLED, None)

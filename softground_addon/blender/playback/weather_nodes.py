@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 
+from ...core.numerics.slices import Slices, sliced
 from ...core.weather import weather as w
 from ...core.weather.weather import Matter, Span
 from ...core.weather.weather_places import BOUNDS, COVERED, NEAR, POWERS
@@ -75,6 +76,7 @@ def within(tree: Any) -> Any:
     return next((node.node_tree for node in tree.nodes if node.bl_idname == "GeometryNodeGroup"), None)
 
 
+@sliced
 def build(
     tree: Any,
     *,
@@ -85,7 +87,7 @@ def build(
     felt: bool = False,
     again: bool = False,
     has_water: bool = True,
-) -> None:
+) -> Slices[None]:
     """Fill a group, in place of what is in it; its inputs stay. See `node_graph.build`.
 
     Parameters
@@ -126,9 +128,15 @@ def build(
         has_water=has_water,
         tables=tables,
     )
-    node_graph.build(inner, fill)
+    try:
+        yield from node_graph.build.slices(inner, fill)
+        yield from node_graph.build.slices(tree, partial(hold, inner=inner))
+    except BaseException:
+        if within(tree) is None:
+            bpy.data.node_groups.remove(inner)
+        weather_table.remove_unused(tables.values())
+        raise
     weather_table.remove_unused(existing.values())
-    node_graph.build(tree, partial(hold, inner=inner))
 
 
 def _fill(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.numerics.arrays import Array
+from ...core.numerics.slices import Slices, result_of, sliced
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
@@ -75,11 +76,16 @@ def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: s
     if existing:
         weather_modifier.separate(existing)
     tree = existing.node_group if existing else weather_inputs.new()
+    fit = _fit.slices(ground, display_mesh, tree, footprints, about, places)
     try:
-        _fit(ground, display_mesh, tree, footprints, about, places)
+        if existing:  # which would not be whole between two slices
+            result_of(fit)
+        else:
+            yield from jobs.meanwhile(jobs.Progress("write", 0.5), fit)
     except BaseException:
         weather_modifier.remove_unused()
         raise
+    display_mesh = baked_ground.display_mesh_of(settings.resolve(name))
     modifier = existing or weather_modifier.put(display_mesh, tree)
     weather_keys.follow(display_mesh)
     if preset:
@@ -149,6 +155,7 @@ def _felt(wanted: BakeSettings) -> BakeSettings:
     return replace(wanted, weather=replace(wanted.weather, **weather_keys.rates(modifier, span_of(first, last))))
 
 
+@sliced
 def _fit(
     ground: bpy.types.Object,
     display_mesh: bpy.types.Object,
@@ -156,8 +163,8 @@ def _fit(
     footprints: list[Footprint],
     about: Mapping[str, Any],
     places: WeatherPlaces,
-) -> None:
-    """Write what the group reads, and fill it."""
+) -> Slices[None]:
+    """Fill the group, and write what it reads in the last slice."""
     with damage_named(ground):
         inputs = about["inputs"]
         (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
@@ -167,10 +174,11 @@ def _fit(
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate)
     mesh = ground_mesh.mesh_of(display_mesh)
-    hollows = store(mesh, places, matter, span)
+    values, hollows = _of_vertices(places, matter, span)
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
-    again, has_water = (name in mesh.attributes for name in (nodes.AGAIN, nodes.WATER))
-    nodes.build(tree, **given, felt=known["felt"], again=again, has_water=has_water)
+    again, has_water = nodes.AGAIN in values, nodes.WATER in mesh.attributes
+    yield from nodes.build.slices(tree, **given, felt=known["felt"], again=again, has_water=has_water)
+    _store(mesh, values)
     if table := hollows_of(tree):
         weather_table.fill(table, hollows)
     tree[weather_keys.LAST] = span.last
@@ -238,6 +246,15 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
     dict of arrays
         The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
     """
+    values, hollows = _of_vertices(places, matter, span)
+    _store(mesh, values)
+    return hollows
+
+
+def _of_vertices(
+    places: WeatherPlaces, matter: Matter, span: Span
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[np.float64]]]:
+    """Attributes that the node group reads, by their names, and the table of the hollows; see `store`."""
     pressed, since, compacted = places.times.T
     capacity, above, remaining = places.pool.T
     rise, filled = places.levels[:, :POWERS], 1 + moment_of(places.levels[:, POWERS], span)
@@ -260,6 +277,11 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         values[nodes.AGAIN] = places.again[:, 0]
         values[nodes.BEFORE] = np.where(again, 1 + moment_of(places.again[:, 1], span), 0)
         values[nodes.BLUR_BEFORE] = places.blur_before
+    pool, rise = np.split(np.vstack([np.zeros(6), each]), 2, axis=1)
+    return values, {"pool": pool, "rise": rise}
+
+
+def _store(mesh: bpy.types.Mesh, values: Mapping[str, NDArray[Any]]) -> None:
     own_data.remove(mesh, set(nodes.OF_WEATHER) - set(values))
     for name, of_vertices in values.items():
         kind = nodes.OF_WEATHER[name]
@@ -267,8 +289,6 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         field = "vector" if kind == "FLOAT_VECTOR" else "value"
         own_data.attribute(mesh, name, kind).data.foreach_set(field, stored.ravel())
     mesh.update()
-    pool, rise = np.split(np.vstack([np.zeros(6), each]), 2, axis=1)
-    return {"pool": pool, "rise": rise}
 
 
 def _values(mesh: bpy.types.Mesh, name: str) -> Array:

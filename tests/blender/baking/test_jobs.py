@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import baked_ground, created_ground
+from softground_addon.blender.ground import baked_ground, baked_steps, created_ground
 from softground_addon.blender.jobs import Progress, meanwhile, run
 from softground_addon.blender.live import live, live_start
+from softground_addon.blender.plants import give_way_nodes
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
+from softground_addon.blender.viewport import step_editing
+from softground_addon.blender.weather import ground_weather
 from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.numerics.slices import sliced
+from softground_addon.core.record.edits import StepEdit
 from tests.blender.shots import walker
 from tests.pace import at_pace
 from tests.tiers import slow_but_one
@@ -147,3 +151,61 @@ def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
     steps = steps_of(bake_job.bake(scene))
     assert options.frame_end == 250
     assert steps[0][0] < at_pace(LONGEST_STEP), steps[:5]
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_no_step_of_weather_and_edits_on_a_million_vertices_takes_long(scene):
+    """All steps are edited; then one more changes, and all are reset."""
+    walker(scene, frames=160)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=60.0)
+    ground = scene.softground.ground = bpy.context.object
+    scene.softground.detail = "NEVER"
+    bpy.context.view_layer.update()
+    run(bake_job.bake(scene))
+    turned = [(step, StepEdit(turn_deg=5.0)) for step in baked_steps.of(ground)]
+    assert len(turned) > 10
+    run(step_editing._edited(scene, step_editing.changed(ground, turned), []))
+    muted = step_editing.changed(ground, [(baked_steps.of(ground)[5], StepEdit(mute=True))])
+    for edits in (muted, {}):
+        steps = steps_of(step_editing._edited(scene, edits, []))
+        assert steps[0][0] < at_pace(LONGEST_IN_A_WINDOW), steps[:5]
+    for _ in ("added", "renewed"):
+        steps = steps_of(ground_weather.adding(ground, preset="SNOWFALL"))
+        assert steps[0][0] < at_pace(LONGEST_IN_A_WINDOW), steps[:5]
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_no_step_of_giving_way_takes_long_and_no_group_stays_when_it_is_cancelled(scene):
+    steps = steps_of(meanwhile(NOW, give_way_nodes.ensure_group.slices()))
+    assert steps[0][0] < at_pace(LONGEST_IN_A_WINDOW), steps[:5]
+    (group,) = bpy.data.node_groups
+    made = [node.bl_idname for node in group.nodes], len(group.links)
+    assert give_way_nodes.ensure_group() == group
+    bpy.data.node_groups.remove(group)
+    for _ in zip(range(4), job := give_way_nodes.ensure_group.slices(), strict=False):
+        pass
+    job.close()
+    assert not bpy.data.node_groups
+    group = give_way_nodes.ensure_group()
+    assert ([node.bl_idname for node in group.nodes], len(group.links)) == made
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_clearing_beside_ten_thousand_objects_takes_as_long_as_blender_takes_to_add_one(scene):
+    walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    scene.softground.sink_feet = True
+    run(bake_job.bake(scene))
+    for _ in range(10_000):
+        scene.collection.objects.link(bpy.data.objects.new("Pebble", None))
+    bpy.context.view_layer.update()
+    began = time.thread_time()
+    bpy.ops.object.empty_add()
+    blenders = time.thread_time() - began
+    began = time.thread_time()
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert time.thread_time() - began < 2.0 * blenders + at_pace(LONGEST_IN_A_WINDOW)

@@ -61,11 +61,12 @@ READING = ("detect_bones", "create_ground", "use_as_ground", "predict_depth", "o
 BAKING = ("bake", "bake_again", "sink_feet", "clean_feet", "make_keys")
 EDITING = ("mute_step", "duplicate_step", "add_step", "reset_step", "reset_steps")
 ON_THE_SPOT = ("walk_ahead", "root_motion")
+PLANTS = ("add_sample_meadow", "give_way")
 
 
 def test_all_buttons_with_a_job_are_pressed_here(addon):
     named = {"add_character", "add_weather", "change_step", "drop_steps", "live"}
-    assert kinds() == {*named, *READING, *BAKING, *EDITING, *ON_THE_SPOT}
+    assert kinds() == {*named, *READING, *BAKING, *EDITING, *ON_THE_SPOT, *PLANTS}
 
 
 def test_each_button_works_in_a_window_and_once_more_where_the_shot_is_known(scene, press):
@@ -152,7 +153,7 @@ def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatc
 
 def test_weather_comes_in_short_steps_and_not_at_all_where_they_are_left(scene, press, steps):
     before = fingerprints.of_file()
-    for ticks in (1, 5):
+    for ticks in (1, 5, 20, 30):
         job = weather.adding(scene.softground.ground)
         list(itertools.islice(job, ticks))
         job.close()
@@ -161,6 +162,26 @@ def test_weather_comes_in_short_steps_and_not_at_all_where_they_are_left(scene, 
         result, ticks = press("add_weather", preset=preset)
         assert (result, ticks > 0) == ({"FINISHED"}, True)
     assert weather.values_of(scene.softground.ground)["Temperature"] == weather.PRESETS["THAW"][1]["Temperature"]
+
+
+def test_plants_give_way_in_short_steps_and_not_at_all_where_they_are_left(scene, monkeypatch, press, steps):
+    before = fingerprints.of_file()
+    for ticks in (1, 4):
+        with monkeypatch.context() as patch:
+            patch.setattr(ModalJob, "execute", ModalJob._start)
+            assert bpy.ops.softground.add_sample_meadow() == {"RUNNING_MODAL"}
+        for _ in range(ticks):
+            state.jobs[0].modal(bpy.context, TIMER)
+        state.jobs[0].modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS"))
+        assert fingerprints.of_file() == before
+    result, ticks = press("add_sample_meadow")
+    assert (result, ticks > 3) == ({"FINISHED"}, True)
+    (grass,) = (obj for obj in scene.objects if obj.type == "CURVES")
+    grass.modifiers.clear()
+    bpy.context.view_layer.objects.active = grass
+    grass.select_set(True)
+    assert press("give_way", kind="REEDS")[0] == {"FINISHED"}
+    assert len(grass.modifiers) == 1
 
 
 @pytest.mark.parametrize("button", ON_THE_SPOT)

@@ -268,10 +268,16 @@ def test_plants_of_a_muted_step_stand_again_and_clear_lets_all_stand_until_the_n
     np.testing.assert_allclose(angles(grass), lying, atol=1e-3)
 
 
-def test_clear_leaves_nothing_behind_where_no_plants_give_way_any_more(shot):
+@pytest.mark.parametrize("again", [False, True], ids=["once", "and again once the plants are free"])
+def test_clear_leaves_nothing_behind_where_no_plants_give_way_any_more(shot, again):
     grass = hair(roots())
-    grass.modifiers.remove(give_way(grass))
-    bpy.ops.softground.clear_bake()
+    modifier = give_way(grass)
+    if again:
+        bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.clear_bake.poll() == (not again), "plants that are left need the table"
+    grass.modifiers.remove(modifier)
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert trampling_table.TRAMPLED not in shot.softground.ground.keys()  # noqa: SIM118
     assert not [obj for obj in bpy.data.objects if obj.name.startswith(trampling_table.NAME)]
     assert not [mesh for mesh in bpy.data.meshes if mesh.name.startswith(trampling_table.NAME)]
 

@@ -16,7 +16,16 @@ ON_THE_SPOT = ("add_character", "walk_ahead")
 """A click on the second comes right after the first, which has read the shot."""
 READING = ("detect_bones", "predict_depth", "overlay", "read_again", "create_ground", "use_as_ground")
 BAKING = ("bake", "bake_again", "sink_feet", "clean_feet")
-EDITING = ("mute_step", "duplicate_step", "reset_step", "reset_steps", "add_weather", "make_keys")
+EDITING = (
+    "mute_step",
+    "duplicate_step",
+    "reset_step",
+    "reset_steps",
+    "add_weather",
+    "make_keys",
+    "add_sample_meadow",
+    "give_way",
+)
 
 
 def tell(hand: Hand, facts: dict) -> Steps:
@@ -40,6 +49,8 @@ def tell(hand: Hand, facts: dict) -> Steps:
             yield from press(hand, name, facts["pressed"][name])
     steps = module("ground.baked_steps")
     for name in EDITING:
+        if name == "give_way":
+            select_meadow()
         session().step = steps.of(scene().softground.ground)[0].name
         facts["pressed"][name] = []
         yield from press(hand, name, facts["pressed"][name])
@@ -51,6 +62,14 @@ def tell(hand: Hand, facts: dict) -> Steps:
         facts["pressed"][name] = []
         yield from press(hand, name, facts["pressed"][name])
     facts["travel"].append(travel(armature))
+
+
+def select_meadow() -> None:
+    """Select the plants that were added, alone."""
+    grass = next(obj for obj in scene().objects if obj.type == "CURVES")
+    for obj in scene().objects:
+        obj.select_set(obj == grass)
+    bpy.context.view_layer.objects.active = grass
 
 
 def with_a_job(kind: type) -> set[str]:
