@@ -20,6 +20,7 @@ from ..motion.sole_motion import shortest_length
 from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
+from .hovering import hovering
 from .skin_check import OFF_SKIN, level_on_slope, skin_check
 
 PERSON_LEG = 0.87
@@ -126,6 +127,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
     missed = missed_steps(motion, character.contacts)
     if missed:
         yield advice(motion.name, missed, f"'{ground}'")
+    if floats := hovering(character):
+        yield floats
     belt = treadmill_speed(motion, character.contacts)
     if belt > 0:
         yield Finding(

@@ -100,3 +100,39 @@ def test_skin_that_rests_where_nothing_prints_is_pointed_out(walking_stool):
     for name in list(LEGS)[1:]:
         soles.remove(soles.find(name))
     assert "skin_without_step" in codes(bake(walking_stool).report)
+
+
+def bobbing(scene, height, path, *, skin=True):
+    """A figure that moves as a whole along a path: its height over frames, while it travels."""
+    armature = shots.walker(scene, frames=72)
+    armature.animation_data_clear()
+    if not skin:
+        bpy.data.objects.remove(armature.children[0])
+    for frame in range(1, 73):
+        time = (frame - 1) / 24
+        armature.location = (0.0, -0.6 * time, height + path(time))
+        armature.keyframe_insert("location", frame=frame)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+
+
+@pytest.mark.parametrize("skin", [True, False])
+@pytest.mark.parametrize(("bob", "period"), [(0.1, 1.5), (0.04, 1.0)])
+def test_a_body_that_hovers_is_said_to_print_only_where_it_dips(scene, bob, period, skin):
+    bobbing(scene, 0.9, lambda time: bob * np.sin(2 * np.pi * time / period), skin=skin)
+    report = bake(scene).report
+    assert report["steps"]
+    assert "hovers" in codes(report)
+
+
+def test_hops_do_not_hover(scene):
+    """Thrown up every second, they fall as bodies do."""
+
+    def hop(time):
+        aloft = np.clip(time % 1 - 0.5, 0.0, 0.5)
+        return 9.81 / 2 * aloft * (0.5 - aloft)
+
+    bobbing(scene, 0.0, hop)
+    report = bake(scene).report
+    assert report["steps"]
+    assert "hovers" not in codes(report)
