@@ -42,6 +42,9 @@ Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
 """Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
 around them [m]."""
 
+_Shares = Sequence[Sequence[CharacterLoads]]
+"""From `shares_of`."""
+
 PART = 0.025
 """Processor time of a part of an answer, beside the frame that is being pressed when it ends [s]."""
 
@@ -76,6 +79,7 @@ class LiveMode:
         self._can_start_over = True
         self._parts = tuple(parts)
         self._analysis, self._wanted = known, wanted
+        self._shares: tuple[analysis.Analysis, list[float], _Shares] | None = None
 
     def follow(self, scene: bpy.types.Scene) -> bool:
         """Show the grounds at the scene's frame; False if one is gone or was changed by somebody else."""
@@ -178,7 +182,7 @@ class LiveMode:
             return
         wholes = [part.playhead for part in self._parts]
         if not self._presses_like(known, asked):
-            shares = yield from shares_of(asked, known.shot.motions, known.loads, known.shot.terrain)
+            shares = yield from self._shared(known, asked)
             if fault := self._not_shown(shares):
                 self._refused = asked, known, fault
                 return
@@ -196,7 +200,15 @@ class LiveMode:
         for part, whole in zip(self._parts, wholes, strict=True):
             part.take_over(whole, part.object(self.current_scene()), asked)
 
-    def _not_shown(self, shares: Sequence[Sequence[CharacterLoads]]) -> str:
+    def _shared(self, known: analysis.Analysis, asked: BakeSettings) -> Generator[None, None, _Shares]:
+        """What of the loads each ground bears, which is looked up once for a shot: no slider waits for it."""
+        landing = [each.material.characteristic_time for each in asked.of_each_ground]
+        if self._shares is None or self._shares[0] is not known or self._shares[1] != landing:
+            sharing = shares_of(asked, known.shot.motions, known.loads, known.shot.terrain)
+            self._shares = known, landing, (yield from sharing)
+        return self._shares[2]
+
+    def _not_shown(self, shares: _Shares) -> str:
         """Reason if soles touch a ground that does not follow the timeline, or there are fewer grounds than before."""
         followed = {part.number for part in self._parts}
         others = {number for number, loads in enumerate(shares) if touched(loads)} - followed
