@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ EASE = 1 / 24
 """Time between keys [s]: those of most actions, which ease from the first key and into the last."""
 LONGEST_EASE = 0.15
 """It is no longer than this, in sqrt(leg length/gravity): small bodies start in less."""
+WHOLE = 0.3
+"""Part of a frame by which it may be longer than whole frames: at 30 a second, keys of 24 are seen in no second one."""
 STARTS = 0.01
 """A body that moves less in that time stands or stops, in leg lengths (0.2 m/s for an adult)."""
 EASES = 0.8
@@ -146,7 +149,7 @@ def _eased(motion: CharacterMotion) -> Mask:
     """
     paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
     ease = min(EASE, LONGEST_EASE * motion.pendulum_time)
-    eased, count = np.zeros(len(motion.frames), dtype=bool), round(ease / motion.time_step)
+    eased, count = np.zeros(len(motion.frames), dtype=bool), ceil(ease / motion.time_step - WHOLE)
     if not 1 < count < len(eased) / 2:
         return eased
     for order in (slice(None), slice(None, None, -1)):

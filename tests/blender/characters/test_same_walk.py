@@ -95,10 +95,8 @@ def test_a_walk_keeps_its_steps_and_its_loads(addon, change):
     assert others[whole, 2] == pytest.approx(steps[whole, 2], rel=0.03)
 
 
-@pytest.mark.parametrize("rate", [48, 120])
-@pytest.mark.parametrize(
-    ("first", "error"), [(17, 0.06), (32, 0.06), (38, 0.2)]
-)  # the last begins with 0.1 s of a step
+@pytest.mark.parametrize("rate", [48, 60, 120])
+@pytest.mark.parametrize(("first", "error"), [(17, 0.06), (32, 0.06), (38, 0.2)])  # the last begins at a foot's end
 def test_the_ends_of_a_cut_take_bear_alike_at_all_frame_rates(addon, first, error, rate):
     def at(rate):
         def change(armature, scene):
@@ -108,4 +106,5 @@ def test_the_ends_of_a_cut_take_bear_alike_at_all_frame_rates(addon, first, erro
         steps, _ = steps_of(change)
         return steps[steps[:, 1] - steps[:, 0] > 0.07]  # what has just landed bears by chance
 
+    error = max(error, 0.16) if rate % 24 else error  # keys lie between frames there, and the last pose is held
     assert at(rate) == pytest.approx(at(24), rel=error, abs=0.03)
