@@ -27,7 +27,7 @@ def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 
 Column = tuple[str, Any, NDArray[Any]]
-"""Name, data type and values (V,) or (V, 3) of an attribute of points."""
+"""Name, data type and values (V,), (V, 2) or (V, 3) of an attribute of points."""
 
 
 def points(name: str, place: NDArray[np.floating], columns: Iterable[Column]) -> bpy.types.Mesh:
@@ -44,7 +44,7 @@ def add_attributes(geometry: bpy.types.Mesh | bpy.types.Curves, columns: Iterabl
     for name, kind, values in columns:
         attribute: Any = geometry.attributes.new(name, kind, "POINT")
         flat = values.astype(np.int32 if kind.startswith("INT") else np.float32).ravel()
-        attribute.data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
+        attribute.data.foreach_set("vector" if values.ndim > 1 else "value", flat)
 
 
 def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

@@ -18,6 +18,7 @@ from ..characters.selection import all_leaders
 from ..compat import HAS_SLOTS, slot_of
 from ..ground.still_ground import changes_shape
 from ..placement import UP, world_matrix
+from ..plants import give_way_nodes, trampling_table
 from ..reading import staleness
 from ..reading.shots import Shot
 from ..rigs.frame_ranges import ancestors, playing_tracks
@@ -52,8 +53,23 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
         *_unseen_ground(scene, wanted),
+        *_edited_plants(),
         *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
+
+
+def _edited_plants() -> Iterator[Finding]:
+    """Plants that give way by nodes of an earlier version, which stay because the user edited them."""
+    for obj in bpy.data.objects:
+        group = getattr(trampling_table.modifier_of(obj), "node_group", None)
+        if group and group.get(give_way_nodes.MARK) != give_way_nodes.VERSION and give_way_nodes.is_edited(group):
+            yield Finding(
+                "give_way_edited",
+                "note",
+                f"'{obj.name}' gives way by '{group.name}' of an earlier version, which you edited and which stays as "
+                "it is. It may not fit this bake.",
+                "To have the nodes of this version, remove the modifier and choose Give Way again.",
+            )
 
 
 def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:

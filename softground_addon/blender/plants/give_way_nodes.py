@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from math import pi
 from typing import Any
 
@@ -21,16 +22,19 @@ from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
 from . import litter_nodes
-from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, META, PACE, SHARES, SINK, TILES, TIMES, VERSION
+from .table_nodes import Table, any_of, at_element, in_cells, is_over, slot_of, table_of, turned
+from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
 
 GROUP = "SoftGround Give Way"
 BENT = "softground_bent"
 """For materials, of curves, instances and points: from 0 to 1, how far they lie."""
+MADE = "softground_give_way_made"
+"""Of the group: what it was when it was made."""
+_NUMBERS = ("VALUE", "INT", "VECTOR")
 _ROOT, _PART, _LOW = (f".softground_{name}" for name in ("root", "part", "low"))
 """Of the vertices of loose parts meanwhile."""
 _NOWHERE = 1e9
 """More vertices than a table has."""
-_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 INPUTS = (
     GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
@@ -62,8 +66,44 @@ def ensure_group() -> Slices[Any]:
     except BaseException:
         bpy.data.node_groups.remove(tree)
         raise
-    tree[MARK] = VERSION
+    tree[MARK], tree[MADE] = VERSION, _digest(tree)
     return tree
+
+
+def is_edited(tree: Any) -> bool:
+    """True of a node group of any version whose nodes are not those that were made."""
+    made = tree.get(MADE)
+    return made is not None and made != _digest(tree)
+
+
+def _digest(tree: Any) -> str:
+    """Hash of the nodes of a group, of what is set in them and of their links, wherever they lie in the editor.
+
+    Sockets that are not shown differ between Blender's versions.
+    """
+    nodes = {
+        node.name: (
+            node.bl_idname,
+            node.mute,
+            getattr(node, "operation", ""),
+            *(
+                _rounded(socket.default_value)
+                for socket in node.inputs
+                if socket.type in _NUMBERS and socket.enabled and not socket.is_linked
+            ),
+        )
+        for node in tree.nodes
+    }
+    links = (
+        (link.from_node.name, link.from_socket.name, link.to_node.name, link.to_socket.name, link.is_muted)
+        for link in tree.links
+    )
+    return sha256(repr((sorted(nodes.items()), sorted(links))).encode()).hexdigest()
+
+
+def _rounded(value: Any) -> Any:
+    """A number or a vector of them in six digits."""
+    return f"{value:.6g}" if isinstance(value, int | float) else tuple(f"{part:.6g}" for part in value)
 
 
 def is_give_way(tree: Any) -> bool:
@@ -71,51 +111,11 @@ def is_give_way(tree: Any) -> bool:
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
-@dataclass(frozen=True)
-class _Table:
-    """The table as the group sees it, with its numbers and what is chosen.
-
-    Attributes
-    ----------
-    to_scatter : matrix
-        From cells to the scatter's space.
-    cell_up : vector
-        Up by one cell, in the scatter's space.
-    ways : three vectors
-        Axes of the table for a length of one along its last one, `up`, in the scatter's space.
-    axes, origin : two vectors and a vector
-        By which the column and the row of a place are found.
-    """
-
-    vertices: Any
-    to_scatter: Any
-    cell_up: Any
-    ways: list[Any]
-    axes: list[Any]
-    origin: Any
-    row: Number
-    tile: Number
-    frame_rate: Number
-    columns: Number
-    rows: Number
-    first_frame: Number
-    cell: Number
-    gravity: Number
-    radius: Number
-    stands: Any
-    rolls: Any
-    sinks: Any
-
-    @property
-    def up(self) -> Any:
-        return self.ways[2]
-
-
 def _fill(graph: NodeGraph) -> None:
     chosen = graph.node("NodeGroupInput").outputs
     frame = graph.number(graph.frame())
     plant = Plant(*(graph.number(chosen[name]) for name in ("Height", "Stiffness", "Recovery", "Breaks", "Half After")))
-    table = _table(graph, chosen)
+    table = table_of(graph, chosen)
     graph.next_row()
     passes = _passes(graph, table, plant, frame)
 
@@ -123,7 +123,7 @@ def _fill(graph: NodeGraph) -> None:
     graph.next_row()
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
     position = graph.position()
-    root, move = _at(graph, position, first, "POINT"), partial(_put, graph, table, position)
+    root, move = at_element(graph, position, first, "POINT"), partial(_put, graph, table, position)
     geometry = _given_way(graph, table, passes, given, "CURVE", root, move)
     graph.next_row()
     move = partial(_instances_moved, graph, table, position)
@@ -136,36 +136,6 @@ def _fill(graph: NodeGraph) -> None:
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
     )
     graph.finish(graph.choose("GEOMETRY", acts, given, geometry))
-
-
-def _table(graph: NodeGraph, chosen: Any) -> _Table:
-    info = graph.node("GeometryNodeObjectInfo", {"Object": chosen["Table"]}, transform_space="RELATIVE")
-    vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
-    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter}).outputs["Matrix"]
-    origin = graph.node("FunctionNodeTransformPoint", {"Vector": (0.0, 0.0, 0.0), "Transform": inverted})
-    ways = [_turned(graph, way, to_scatter) for way in _UNITS]
-    cell_up, each = ways[2], graph.math("DIVIDE", 1.0, graph.vector("LENGTH", ways[2], output="Value"))
-    ways = [graph.scaled(way, each) for way in ways]
-    back = [graph.parts(_turned(graph, way, inverted)) for way in _UNITS]
-    axes = [graph.combined(*(way[number].socket for way in back)) for number in (0, 1)]
-    numbers = graph.attribute(META, "FLOAT_VECTOR")
-    row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
-    columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
-    cell, gravity, radius = graph.parts(graph.at_index(vertices, numbers, 2))
-    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius
-    space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
-    return _Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
-
-
-def _turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
-    inputs = {"Direction": direction, "Transform": by}
-    return graph.node("FunctionNodeTransformDirection", inputs).outputs["Direction"]
-
-
-def _at(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOAT_VECTOR") -> Any:
-    """Value of a field at one of the elements of the geometry that it is of."""
-    inputs = {"Value": value, "Index": index}
-    return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
 
 
 @dataclass(frozen=True)
@@ -200,13 +170,13 @@ class _Passes:
     sent: Any
 
 
-def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Passes:
+def _passes(graph: NodeGraph, table: Table, plant: Plant, frame: Number) -> _Passes:
     active = graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR"))[0]
     before = graph.accumulated(graph.compare("LESS_EQUAL", active, frame.socket), "INT").outputs["Leading"]
     counted, (before,) = graph.captured(table.vertices, graph.number(before), kinds="INT")
     index, first = graph.node("GeometryNodeInputIndex").outputs["Index"], graph.attribute(FIRST, "INT")
-    following = _at(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
-    of_slot = [graph.number(_at(graph, before.socket, at, "POINT", "INT")) for at in (first, following)]
+    following = at_element(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
+    of_slot = [graph.number(at_element(graph, before.socket, at, "POINT", "INT")) for at in (first, following)]
     count = of_slot[1] - of_slot[0]
     latest = graph.number(first) + count - 1.0 + (1.0 - count.above(0.5)) * _NOWHERE
 
@@ -221,7 +191,7 @@ def _passes(graph: NodeGraph, table: _Table, plant: Plant, frame: Number) -> _Pa
     vertices, (held, weight, pressed) = graph.captured(table.vertices, *fields, kinds=kinds)
 
     def earlier(value: Any) -> Any:
-        return graph.scaled(_at(graph, value, graph.math("SUBTRACT", index, 1.0), "POINT"), is_second.socket)
+        return graph.scaled(at_element(graph, value, graph.math("SUBTRACT", index, 1.0), "POINT"), is_second.socket)
 
     toward, sink = graph.attribute(LEAN, "FLOAT_VECTOR"), graph.attribute(SINK, "FLOAT_VECTOR")
     *bends, remain = graph.parts(held.socket)
@@ -264,7 +234,7 @@ class _Moved:
 
 def _given_way(
     graph: NodeGraph,
-    table: _Table,
+    table: Table,
     passes: _Passes,
     geometry: Any,
     domain: str,
@@ -273,25 +243,23 @@ def _given_way(
     each: Any = None,
 ) -> Any:
     """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers."""
-    place = _in_cells(graph, table, root)
-    latest = graph.number(graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT"))
+    rooted, (root,) = graph.captured(geometry, graph.number(root), kinds="VECTOR", domain=domain)
+    place = in_cells(graph, table, root.socket)
+    is_near = any_of(graph, rooted, is_over(graph, table, place), domain)
+    latest = graph.number(graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT"))
     is_touched = 1.0 - latest.above(0.5 * _NOWHERE)
-    kinds = ("VECTOR", "INT", "BOOLEAN")
-    found, (root, latest, is_touched) = graph.captured(
-        geometry, graph.number(root), latest, is_touched, kinds=kinds, domain=domain
-    )
-    total = graph.accumulated(is_touched.socket, "INT", domain).outputs["Total"]
-    touched = graph.number(graph.at_index(found, total, 0, "INT", domain))
+    found, (latest, is_touched) = graph.captured(rooted, latest, is_touched, kinds=("INT", "BOOLEAN"), domain=domain)
+    touched = any_of(graph, found, is_touched.socket, domain)
 
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
-    place = _in_cells(graph, table, root.socket)
+    place = in_cells(graph, table, root.socket)
     sent = litter_nodes.sent_off(graph, passes, latest, chance)
     way_there = zip(place, graph.parts(sent), strict=False)
     place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
-    acting = graph.at_index(passes.counted, passes.latest, _slot(graph, table, place).socket, "INT")
+    acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT")
     acting = graph.choose("INT", table.stands, acting, latest.socket)
     lean, further, share, ground = (
         graph.at_index(passes.vertices, value, acting)
@@ -306,7 +274,7 @@ def _given_way(
     seen = height.at_most(0.0) + height.at_least(0.0) * chance.above(BURIED)
     height = graph.choose("FLOAT", table.stands, seen.socket, height.socket)
     shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, 0.0, height))
-    way = _turned(graph, sent, table.to_scatter)
+    way = turned(graph, sent, table.to_scatter)
     shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
@@ -315,35 +283,17 @@ def _given_way(
     lean, shift, bent = (number.socket for number in captured)
     moved = _Moved(lean, shift, bent, is_touched.socket)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
-    return graph.choose("GEOMETRY", touched.socket, geometry, move(changed, moved))
+    moved_there = graph.choose("GEOMETRY", touched, geometry, move(changed, moved))
+    return graph.choose("GEOMETRY", is_near, geometry, moved_there)
 
 
-def _in_cells(graph: NodeGraph, table: _Table, root: Any) -> list[Number]:
-    """Column and row of a root, with fractions."""
-    origin = graph.parts(table.origin)[:2]
-    return [graph.number(graph.dot(root, axis)) + first for axis, first in zip(table.axes, origin, strict=True)]
-
-
-def _slot(graph: NodeGraph, table: _Table, place: list[Number]) -> Number:
-    """Slot of a place in cells."""
-    lasts = table.columns, table.rows
-    column, row = (part.floor().at_most(last).at_least(0.0) for part, last in zip(place, lasts, strict=True))
-    tile_column, tile_row = ((part / table.tile).floor() for part in (column, row))
-    number = tile_row * table.row + tile_column
-    begin = graph.number(graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number.socket, "INT"))
-    return begin + row * table.tile + column
-
-
-def _put(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _Moved) -> Any:
-    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length.
-
-    Those of others go nowhere, which takes less time than to leave them out.
-    """
+def _put(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
+    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length."""
     height = graph.dot(position, table.up)
-    return graph.put(geometry, True, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
+    return graph.put(geometry, moved.is_touched, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
 
 
-def _instances_moved(graph: NodeGraph, table: _Table, position: Any, geometry: Any, moved: _Moved) -> Any:
+def _instances_moved(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
     """Turn instances about their origins: plants until they lie, litter with the ground."""
     rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
     turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": rotation})
@@ -368,7 +318,7 @@ def _instances_moved(graph: NodeGraph, table: _Table, position: Any, geometry: A
     return geometry
 
 
-def _loose_parts_moved(graph: NodeGraph, table: _Table, passes: _Passes, geometry: Any, position: Any) -> Any:
+def _loose_parts_moved(graph: NodeGraph, table: Table, passes: _Passes, geometry: Any, position: Any) -> Any:
     """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices.
 
     What each sum takes is stored first: a sum within another is worked out twice.
@@ -376,7 +326,8 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, passes: _Passes, geometr
     parts = graph.node("GeometryNodeSeparateComponents")
     graph.link(geometry, parts.inputs["Geometry"])
     island = graph.node("GeometryNodeInputMeshIsland").outputs["Island Index"]
-    mesh = graph.store(parts.outputs["Mesh"], _PART, island, True, "INT")
+    given = parts.outputs["Mesh"]
+    mesh = graph.store(given, _PART, island, True, "INT")
     part, low = graph.attribute(_PART, "INT"), graph.attribute(_LOW)
 
     def total(value: Any) -> Any:
@@ -395,6 +346,8 @@ def _loose_parts_moved(graph: NodeGraph, table: _Table, passes: _Passes, geometr
     mesh = graph.store(mesh, _ROOT, root, True, "FLOAT_VECTOR")
     move, root = partial(_put, graph, table, position), graph.attribute(_ROOT, "FLOAT_VECTOR")
     mesh = graph.forgotten(_given_way(graph, table, passes, mesh, "POINT", root, move, part), _ROOT, _PART, _LOW)
+    is_near = any_of(graph, given, is_over(graph, table, in_cells(graph, table, position)), "POINT")
+    mesh = graph.choose("GEOMETRY", is_near, given, mesh)
     joined = graph.node("GeometryNodeJoinGeometry")
     for piece in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:
         graph.link(piece, joined.inputs["Geometry"])

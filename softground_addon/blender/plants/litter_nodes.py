@@ -1,4 +1,4 @@
-"""Nodes by which litter rolls along or is thrown; `table` and `passes` are those of `give_way_nodes`."""
+"""Nodes by which litter rolls along or is thrown; `passes` are those of `give_way_nodes`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from ...core.plants.bending import Pass
 from ..nodes.node_graph import NodeGraph, Number
+from .table_nodes import Table
 from .trampling_layout import LEAN, SENT_BY, SINK
 
 ROLLING = 0.4
@@ -15,7 +16,7 @@ ASIDE = 2 * pi / 3
 """Angle over which pieces part that are sent off [rad]."""
 
 
-def way(graph: NodeGraph, table: Any, by: Pass, height: Number, frame: Number) -> Any:
+def way(graph: NodeGraph, table: Table, by: Pass, height: Number, frame: Number) -> Any:
     """Way of litter: rolled along where the ground is too hard to press it in, thrown back by soles that throw debris.
 
     What rolls is slowed down evenly; what is thrown leaves at 45° with the speed of the sole, v, less what holds it:

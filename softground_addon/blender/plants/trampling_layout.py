@@ -1,6 +1,6 @@
 """Layout of the table by which plants give way: names of its attributes, and its version."""
 
-MARK, VERSION = "softground_give_way", 2
+MARK, VERSION = "softground_give_way", 3
 """Custom property of the group and of the table's vertices: the version of how they fit together."""
 
 TILES, FIRST, SENT_BY = "softground_tiles", "softground_first", "softground_sent_by"
@@ -10,7 +10,7 @@ ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
     f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
 )
 """Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
-direction; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
+direction, of two numbers; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
 META = "softground_meta"
 """Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first
 frame; of the third: side of a cell, gravity and radius of a sole's parts, in

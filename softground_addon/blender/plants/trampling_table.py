@@ -92,8 +92,8 @@ def modifier_of(obj: bpy.types.Object) -> Any:
 
 
 def _play_anew(modifier: Any) -> None:
-    """Have a modifier play the group of this version, with what the artist has set."""
-    if modifier.node_group.get(layout.MARK) != layout.VERSION:
+    """Have a modifier play the group of this version, with what the artist has set, but for one that they edited."""
+    if modifier.node_group.get(layout.MARK) != layout.VERSION and not nodes.is_edited(modifier.node_group):
         known = inputs_of(modifier)
         chosen = {name: compat.read_input(modifier, known[name]) for name, *_ in nodes.INPUTS if name in known}
         modifier.node_group = nodes.ensure_group()
@@ -118,19 +118,18 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     following = np.where(is_second[1:-1], np.append(active[1:], NEVER), NEVER)
     after = np.where(is_second[1:-1], np.append(following[1:], NEVER), NEVER)
     second = is_second[:-2]
-    level = np.zeros(len(active))
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
         (layout.META, "FLOAT_VECTOR", np.array(meta)),
         (layout.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
         (layout.FIRST, "INT", trampled.first),
         (layout.SENT_BY, "INT", _first_to_tread(trampled)),
+        (layout.LEAN, "FLOAT2", trampled.direction),
         *(
             (name, "FLOAT_VECTOR", np.column_stack(parts))
             for name, parts in (
                 (layout.ACTIVE, (active, following, after)),
                 (layout.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
                 (layout.PACE, (by.down * pace, by.up * pace, by.above / scale)),
-                (layout.LEAN, (trampled.direction, level)),
                 (layout.SHARES, (by.reach, by.lasting, second)),
                 (layout.SINK, (trampled.slope, trampled.sink / size)),
             )

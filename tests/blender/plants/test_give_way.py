@@ -13,13 +13,13 @@ from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes.node_modifiers import inputs_of
-from softground_addon.blender.plants import give_way_nodes, litter_nodes, trampling_table
+from softground_addon.blender.plants import give_way_nodes, litter_nodes, trampling_layout, trampling_table
 from softground_addon.blender.playback import own_data
 from softground_addon.core.plants.bending import MOST_LASTING, PLANTS
 from softground_addon.core.plants.tramplings import tramplings
 from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
-from tests.blender.grounds import plane
+from tests.blender.grounds import bake, plane
 
 HEIGHT, POINTS, RATE = 0.3, 5, 24.0
 
@@ -416,7 +416,7 @@ def test_litter_is_thrown_by_the_gravity_of_the_scene(shot):
     assert bpy.ops.softground.bake() == {"FINISHED"}
     vertices = trampling_table.of(shot.softground.ground).data
     numbers = np.empty(3 * len(vertices.vertices), np.float32)
-    vertices.attributes[give_way_nodes.META].data.foreach_get("vector", numbers)
+    vertices.attributes[trampling_layout.META].data.foreach_get("vector", numbers)
     assert numbers.reshape(-1, 3)[2, 1] == pytest.approx(1.62)
 
 
@@ -442,6 +442,7 @@ def test_a_table_and_a_group_of_an_earlier_version_are_renewed_as_the_file_opens
     expected, group, table = angles(grass), modifier.node_group, trampling_table.of(shot.softground.ground)
     group[give_way_nodes.MARK], group.name = True, "Of before"
     group.nodes.clear()
+    del group[give_way_nodes.MADE]  # as of those that did not say how they were made
     table.data.clear_geometry()
     del table.data[give_way_nodes.MARK]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "earlier.blend"))
@@ -454,6 +455,34 @@ def test_a_table_and_a_group_of_an_earlier_version_are_renewed_as_the_file_opens
     assert compat.read_input(modifier, inputs_of(modifier)["Height"]) == pytest.approx(0.4)
     np.testing.assert_allclose(angles(grass), expected, atol=1e-3)
     assert trampling_table.is_current(scene.softground.ground)
+
+
+def test_nodes_that_the_user_edited_stay_when_a_file_of_an_earlier_version_opens(shot, tmp_path):
+    mine, grass = hair(roots()), hair(roots())
+    give_way(mine, grass)
+    group = mine.modifiers[-1].node_group
+    assert not give_way_nodes.is_edited(group)
+    other = group.copy()
+    grass.modifiers[-1].node_group = other
+    for each in (group, other):
+        each[give_way_nodes.MARK] = give_way_nodes.VERSION - 1
+    group.name = "Mine"
+    for node in group.nodes:
+        node.location.x += 100.0  # which changes nothing
+    assert not give_way_nodes.is_edited(group)
+    next(node for node in group.nodes if node.bl_idname == "ShaderNodeMath" and not node.inputs[1].is_linked).inputs[
+        1
+    ].default_value += 0.25
+    del trampling_table.of(shot.softground.ground).data[give_way_nodes.MARK]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    kept, renewed = (bpy.data.objects[name].modifiers[-1].node_group for name in ("Grass", "Grass.001"))
+    assert (kept.name, give_way_nodes.is_edited(kept)) == ("Mine", True)
+    assert renewed.get(give_way_nodes.MARK) == give_way_nodes.VERSION
+    result = bake(bpy.context.scene)
+    assert "'Mine' of an earlier version" in next(
+        finding["message"] for finding in result.report["self_check"] if finding["code"] == "give_way_edited"
+    )
 
 
 def test_vertices_of_the_ground_and_blades_know_of_it_for_materials(shot):

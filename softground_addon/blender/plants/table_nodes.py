@@ -1,0 +1,110 @@
+"""Nodes by which a scatter finds its way in the table of `trampling_table`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..nodes.node_graph import NodeGraph, Number
+from .trampling_layout import META, TILES
+
+_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Table:
+    """The table as the group sees it, with its numbers and what is chosen.
+
+    Attributes
+    ----------
+    to_scatter : matrix
+        From cells to the scatter's space.
+    cell_up : vector
+        Up by one cell, in the scatter's space.
+    ways : three vectors
+        Axes of the table for a length of one along its last one, `up`, in the scatter's space.
+    axes, origin : two vectors and a vector
+        By which the column and the row of a place are found.
+    """
+
+    vertices: Any
+    to_scatter: Any
+    cell_up: Any
+    ways: list[Any]
+    axes: list[Any]
+    origin: Any
+    row: Number
+    tile: Number
+    frame_rate: Number
+    columns: Number
+    rows: Number
+    first_frame: Number
+    cell: Number
+    gravity: Number
+    radius: Number
+    stands: Any
+    rolls: Any
+    sinks: Any
+
+    @property
+    def up(self) -> Any:
+        return self.ways[2]
+
+
+def table_of(graph: NodeGraph, chosen: Any) -> Table:
+    info = graph.node("GeometryNodeObjectInfo", {"Object": chosen["Table"]}, transform_space="RELATIVE")
+    vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
+    inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter}).outputs["Matrix"]
+    origin = graph.node("FunctionNodeTransformPoint", {"Vector": (0.0, 0.0, 0.0), "Transform": inverted})
+    ways = [turned(graph, way, to_scatter) for way in _UNITS]
+    cell_up, each = ways[2], graph.math("DIVIDE", 1.0, graph.vector("LENGTH", ways[2], output="Value"))
+    ways = [graph.scaled(way, each) for way in ways]
+    back = [graph.parts(turned(graph, way, inverted)) for way in _UNITS]
+    axes = [graph.combined(*(way[number].socket for way in back)) for number in (0, 1)]
+    numbers = graph.attribute(META, "FLOAT_VECTOR")
+    row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
+    columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
+    cell, gravity, radius = graph.parts(graph.at_index(vertices, numbers, 2))
+    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius
+    space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
+    return Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
+
+
+def turned(graph: NodeGraph, direction: Any, by: Any) -> Any:
+    inputs = {"Direction": direction, "Transform": by}
+    return graph.node("FunctionNodeTransformDirection", inputs).outputs["Direction"]
+
+
+def at_element(graph: NodeGraph, value: Any, index: Any, domain: str, kind: str = "FLOAT_VECTOR") -> Any:
+    """Value of a field at one of the elements of the geometry that it is of."""
+    inputs = {"Value": value, "Index": index}
+    return graph.node("GeometryNodeFieldAtIndex", inputs, data_type=kind, domain=domain).outputs["Value"]
+
+
+def any_of(graph: NodeGraph, geometry: Any, condition: Any, domain: str) -> Any:
+    """Above 0 if a condition holds for any element of a geometry."""
+    total = graph.accumulated(condition, "INT", domain).outputs["Total"]
+    return graph.at_index(geometry, total, 0, "INT", domain)
+
+
+def is_over(graph: NodeGraph, table: Table, place: list[Number]) -> Any:
+    """1 of places in cells that are over the table, else 0."""
+    column, row = place
+    beyond = (0.0 - column).at_least(column - table.columns).at_least((0.0 - row).at_least(row - table.rows))
+    return graph.compare("LESS_THAN", beyond.socket, 1.0)
+
+
+def in_cells(graph: NodeGraph, table: Table, root: Any) -> list[Number]:
+    """Column and row of a root, with fractions."""
+    origin = graph.parts(table.origin)[:2]
+    return [graph.number(graph.dot(root, axis)) + first for axis, first in zip(table.axes, origin, strict=True)]
+
+
+def slot_of(graph: NodeGraph, table: Table, place: list[Number]) -> Number:
+    """Slot of a place in cells."""
+    lasts = table.columns, table.rows
+    column, row = (part.floor().at_most(last).at_least(0.0) for part, last in zip(place, lasts, strict=True))
+    tile_column, tile_row = ((part / table.tile).floor() for part in (column, row))
+    number = tile_row * table.row + tile_column
+    begin = graph.number(graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number.socket, "INT"))
+    return begin + row * table.tile + column
