@@ -36,6 +36,14 @@ def of_file() -> dict[str, Any]:
     }
 
 
+def differences(before: Any, after: Any, where: str = "") -> list[str]:
+    """Where two fingerprints differ, and how where that is short."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        names = sorted(set(before) | set(after), key=str)
+        return [each for n in names for each in differences(before.get(n), after.get(n), f"{where}/{n}")]
+    return [] if before == after else [f"{where}: {str(before)[:200]} -> {str(after)[:200]}"]
+
+
 def of_mesh(mesh: bpy.types.Mesh) -> dict[str, Any]:
     keys = mesh.shape_keys
     return {
@@ -52,7 +60,8 @@ def of_object(thing: bpy.types.Object) -> dict[str, Any]:
     pose = thing.pose.bones if thing.pose else ()
     animation = thing.animation_data
     return {
-        "transform": [tuple(v) for v in (*thing.matrix_basis, *thing.matrix_world, *thing.matrix_parent_inverse)],
+        "transform": [tuple(v) for v in (*thing.matrix_basis, *thing.matrix_parent_inverse)],
+        "world": [tuple(v) for v in thing.matrix_world] if thing.visible_get() else None,  # else it is not kept up
         "visible": (thing.hide_viewport, thing.hide_render, thing.hide_get(), thing.select_get()),
         "instancer": (thing.show_instancer_for_viewport, thing.show_instancer_for_render),
         "data": thing.data.name if thing.data else None,

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import bpy
 import numpy as np
 
+from ...core.errors import InputError
 from ...core.files import files, opensim
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
@@ -20,9 +22,9 @@ def write(loads: Sequence[CharacterLoads], path: Path, start: int, end: int) -> 
     Raises
     ------
     InputError
-        If a file cannot be written.
+        If a file cannot be written, or another one has the name of the external loads; nothing is written then.
     """
-    written: list[Path] = []
+    targets: list[Path] = []
     taken: set[str] = set()
     for character in loads:
         target = path
@@ -31,8 +33,22 @@ def write(loads: Sequence[CharacterLoads], path: Path, start: int, end: int) -> 
             numbered = (f"{stem}_{number}" if number > 1 else stem for number in count(1))
             target = path.with_stem(next(name for name in numbered if name.casefold() not in taken))
             taken.add(target.stem.casefold())
-        written += _write_one(character, target, start, end)
-    return written
+        targets.append(target)
+        _check_free(target)
+    each = zip(loads, targets, strict=True)
+    return [file for character, target in each for file in _write_one(character, target, start, end)]
+
+
+def _check_free(path: Path) -> None:
+    """Raise InputError if the external loads of a table would take the place of a file that is not its own."""
+    loads = path.with_suffix(".xml")
+    if path.suffix != ".mot" or not loads.exists():
+        return
+    if f"<datafile>{escape(path.name)}<" not in loads.read_text(encoding="utf-8", errors="replace"):
+        raise InputError(
+            f"'{loads.name}' is there already and is no external loads of '{path.name}', which are written beside it: "
+            "choose another name, or move that file."
+        )
 
 
 def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> list[Path]:

@@ -50,7 +50,8 @@ def is_current(ground: bpy.types.Object) -> bool:
 
 
 def is_idle(ground: bpy.types.Object) -> bool:
-    """True if a ground has a table, and its plants that gave way by it do no more: the ground alone refers to it."""
+    """True if a ground has a table and no plants that give way by it any more: it alone refers to the table, which is
+    told without a walk over all objects."""
     table = of(ground)
     return table is not None and table.users <= 1
 
@@ -77,7 +78,7 @@ def clear(ground: bpy.types.Object) -> None:
     table = of(ground)
     if table is None:
         return
-    if not is_idle(ground):
+    if any(table in _tables_of(obj) for obj in bpy.data.objects):
         _exchange(table, bpy.data.meshes.new(NAME))
         return
     ground.pop(TRAMPLED, None)

@@ -82,6 +82,18 @@ def opensim_table(path):
     return dict(zip(labels.split("\t"), table.T, strict=True))
 
 
+def test_opensim_replaces_its_own_loads_and_no_other_file_of_that_name(scene, tmp_path):
+    model = tmp_path / "walk.xml"
+    model.write_text("<OpenSimDocument><Model/></OpenSimDocument>")
+    with pytest.raises(RuntimeError, match=r"'walk\.xml' is there already .*choose another name"):
+        bpy.ops.softground.export(filepath=str(tmp_path / "walk.mot"), format="OPENSIM_MOT")
+    assert files_in(tmp_path) == ["walk.xml"]
+    assert model.read_text() == "<OpenSimDocument><Model/></OpenSimDocument>"
+    model.unlink()
+    for _ in range(2):
+        assert bpy.ops.softground.export(filepath=str(tmp_path / "walk.mot"), format="OPENSIM_MOT") == {"FINISHED"}
+
+
 def test_opensim_gets_the_forces_that_bear_the_body_y_up(scene, tmp_path):
     assert bpy.ops.softground.export(filepath=str(tmp_path / "walk"), format="OPENSIM_MOT") == {"FINISHED"}
     assert files_in(tmp_path) == ["walk.mot", "walk.xml"]

@@ -277,9 +277,22 @@ def test_clear_leaves_nothing_behind_where_no_plants_give_way_any_more(shot, aga
     assert bpy.ops.softground.clear_bake.poll() == (not again), "plants that are left need the table"
     grass.modifiers.remove(modifier)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert not bpy.ops.softground.clear_bake.poll()
     assert trampling_table.TRAMPLED not in shot.softground.ground.keys()  # noqa: SIM118
     assert not [obj for obj in bpy.data.objects if obj.name.startswith(trampling_table.NAME)]
     assert not [mesh for mesh in bpy.data.meshes if mesh.name.startswith(trampling_table.NAME)]
+
+
+def test_clear_takes_the_table_of_a_ground_with_a_finer_copy_along(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    ground = scene.softground.ground = plane(scene, vertices=4)
+    bpy.context.view_layer.update()
+    trampling_table.ensure(ground)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert baked_ground.display_mesh_of(ground) != ground
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert trampling_table.TRAMPLED not in ground.keys()  # noqa: SIM118
 
 
 def test_plants_may_give_way_before_there_is_a_bake(opened_as):
