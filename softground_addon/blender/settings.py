@@ -227,7 +227,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         keep_forces=options.keep_forces,
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
-        camera=None if has_ground else camera_view(scene, frames),
+        camera=None if has_ground and options.relief != "CLOSE_UP" else camera_view(scene, frames),
         hard_grounds=tuple(name_of(obj) for obj in hard_grounds_of(options)),
         wet_grounds=_wet_grounds(options),
         marks=options.marks,

@@ -183,7 +183,7 @@ class BakeSettings(SceneUnits):
     weather : FeltWeather or None
         What steps find of earlier ones follows from it; None where they feel none.
     camera : CameraView or None
-        The scene's, where a ground is to be made; None without one.
+        The scene's, where a ground is to be made or shown close up; None without one.
     hard_grounds : tuple of ObjectName
         Objects that soles stand on without a print.
     wet_grounds : tuple of str

@@ -26,6 +26,7 @@ from ...core.findings import Finding
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.motion.motion import shortest_sole
+from ...core.numerics.cell_keys import cells_of
 from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
@@ -302,12 +303,20 @@ CLOSE_UP_FROM = 1.5
 """Grounds whose vertices lie further apart than this many spacings of a close-up get a copy that is finer."""
 
 
-def _spacing(wanted: BakeSettings, trail: Trail) -> float:
-    """Distance of the vertices of a copy along the trail [m]: that of a close-up, if there are not too many then."""
-    spacing, area = wanted.spacing_m, len(trail.moved) * wanted.cell_size_m**2
-    while spacing < wanted.cell_size_m and area / spacing**2 > wanted.relief_vertices:
-        spacing = min(2.0 * spacing, wanted.cell_size_m)
-    return spacing
+def _closer(wanted: BakeSettings, trail: Trail) -> tuple[Region, float] | None:
+    """Part of a trail that a close-up shows from near, and the distance of vertices there [m]; None without any.
+
+    They are as close as asked for, if there are not too many then.
+    """
+    spacing, cell_size = wanted.spacing_m, wanted.cell_size_m
+    if wanted.relief != "CLOSE_UP":
+        return None
+    near = trail.moved
+    if wanted.camera and not (wanted.frame and wanted.frame.moves):
+        near = near[wanted.camera.is_near((cells_of(near) + 0.5) * cell_size, spacing)]
+    while spacing < cell_size and len(near) * (cell_size / spacing) ** 2 > wanted.relief_vertices:
+        spacing = min(2.0 * spacing, cell_size)
+    return (Region(near, cell_size), spacing) if len(near) else None
 
 
 def _given(
@@ -328,7 +337,8 @@ def _given(
     cover = yield from meanwhile(Progress("write", 0.1), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.resolve(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
-    too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
+    closer = _closer(wanted, trail)
+    too_coarse = detail == "AUTO" and closer is not None and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m
     if not too_coarse and not wants_detail(ground, cover, detail, cell_size, sole_length):
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame):
             return baked_ground.on_itself(ground, index, vertices), findings
@@ -336,7 +346,7 @@ def _given(
     reading = trail_detail.coarsest.slices(name, surface, unit_scale, frame)
     coarse, level = yield from meanwhile(Progress("write", 0.1), reading)
     refinement = yield from meanwhile(
-        Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
+        Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), cell_size, closer)
     )
     drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)
     drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)

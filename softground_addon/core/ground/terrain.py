@@ -30,9 +30,6 @@ PLACES_AT_ONCE = 1 << 14
 SLACK = 1e-8
 """By which a triangle's box is wider than it, over its size: more than that of `triangles.barycentric`."""
 
-MOST_OF_PLANE = 1 << 19
-"""Triangles of a mesh that may be taken for a plane, at most: it takes longer to tell than it saves."""
-
 SAME_LAYER = 1e-3
 """Surfaces over one place that are closer than this are one [m]."""
 
@@ -52,23 +49,24 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
     triangles : (T, 3) int array
         Corners of each triangle.
     """
-    if not 0 < len(triangles) <= MOST_OF_PLANE or not np.isfinite(vertices).all():
-        return None
-    if (vertices[:, 2] != vertices[0, 2]).any():
+    if not len(triangles) or not np.isfinite(vertices).all() or np.ptp(vertices[:, 2]) > 0:
         return None
     place = vertices[:, :2]
     low, high = place.min(axis=0), place.max(axis=0)
-    to_second, to_third = np.diff(place[triangles], axis=1).swapaxes(0, 1)
-    turn = to_second[:, 0] * to_third[:, 1] - to_second[:, 1] * to_third[:, 0]
-    if not (turn > 0).all():
-        return None
-    yield
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    keys = np.sort(edges, axis=1) @ (len(vertices), 1)
-    _, first, number = np.unique(keys, return_index=True, return_inverse=True)
-    sides = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1, -1))
-    begin, end = place[edges[first[sides != 0]]].swapaxes(0, 1)
-    if not ((begin == end) & ((begin == low) | (begin == high))).any(axis=1).all():
+    one, other = np.random.default_rng(0).integers(2**63, size=(2, len(vertices)), dtype=np.uint64)
+    sum_of_edges = np.zeros(1, dtype=np.uint64)  # each adds what it takes off the other way round
+    for number in range(0, len(triangles), PLACES_AT_ONCE):
+        yield
+        part = triangles[number : number + PLACES_AT_ONCE]
+        to_second, to_third = np.diff(place[part], axis=1).swapaxes(0, 1)
+        if not (to_second[:, 0] * to_third[:, 1] - to_second[:, 1] * to_third[:, 0] > 0).all():
+            return None
+        begin, end = part.ravel(), part[:, [1, 2, 0]].ravel()
+        at, to = place[begin], place[end]
+        inner = ~((at == to) & ((at == low) | (at == high))).any(axis=1)
+        begin, end = begin[inner], end[inner]
+        sum_of_edges += (one[begin] * other[end] - one[end] * other[begin]).sum()
+    if sum_of_edges.any():
         return None
     return FlatTerrain(float(vertices[0, 2]), tuple(low.tolist()), tuple(high.tolist()))
 

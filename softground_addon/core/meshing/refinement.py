@@ -149,13 +149,17 @@ def _continued(
 
 
 @sliced
-def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinement]:
+def refine(
+    surface: Surface, region: Region, spacing: float, closer: tuple[Region, float] | None = None
+) -> Slices[Refinement]:
     """Cut the faces of a surface until their corners are about `spacing` apart where the region is.
 
     Parameters
     ----------
     spacing : float
         Distance between vertices [m].
+    closer : (Region, float), optional
+        Part of the region where they are closer, by halving, and how close.
 
     Returns
     -------
@@ -164,9 +168,13 @@ def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinemen
         belong to all faces at the edge.
     """
     triangle_vertices = surface.triangle_vertices
-    at_work = yield from _faces_at(surface, triangle_vertices, region, COARSEST_LEG * spacing)
+    legs = [(where, COARSEST_LEG * distance) for where, distance in ((region, spacing), *([closer] if closer else []))]
+    at_work = np.zeros(len(surface.face_start) - 1, dtype=bool)
+    for where, leg in legs:
+        at_work |= yield from _faces_at(surface, triangle_vertices, where, leg)
     yield
-    parts, grain = _equal_parts(surface, triangle_vertices[at_work[surface.triangle_face]], spacing)
+    finest = closer[1] if closer else spacing
+    parts, grain = _equal_parts(surface, triangle_vertices[at_work[surface.triangle_face]], finest)
     if parts > 1:
         at_work[:] = True
     while True:
@@ -174,7 +182,8 @@ def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinemen
         chosen = np.flatnonzero(at_work[surface.triangle_face])
         mesh = Bisection(surface.vertices, triangle_vertices[chosen], parts, grain)
         yield
-        yield from mesh.run(region, COARSEST_LEG * spacing)
+        for where, leg in legs:
+            yield from mesh.run(where, leg)
         reached = _faces_with_edges(surface, mesh.cut_edges()) & ~at_work
         if not reached.any():
             return (yield from _result(surface, chosen, mesh))

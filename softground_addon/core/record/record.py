@@ -52,7 +52,11 @@ _DAMAGE = (
 TAIL = 4096
 """Records that differ do so in their last bytes: the archive's directory is there, with a checksum of everything."""
 
-_FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
+LEVEL = 4
+"""Level of zlib: two thirds of the time of the usual 6, for 3 % more bytes."""
+
+MOST_OF_ZIP32 = 2**30
+"""Size of an array from which its member may need wider sizes [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -196,15 +200,12 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         **({"carved_with": step_edits.to_json(record.carved_with)} if record.carved_with else {}),
     }
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        text = json.dumps(content, ensure_ascii=False)
-        archive.writestr(zipfile.ZipInfo(_TEXT, _FIXED_DATE), text, zipfile.ZIP_DEFLATED)
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
+        with archive.open(_TEXT, "w") as member:  # by name, a member has a fixed date: equal bakes give equal bytes
+            member.write(json.dumps(content, ensure_ascii=False).encode())
         for key, array in arrays.items():
             kind: np.dtype[Any] = np.dtype(array.kind)
-            entry = zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.file_size = array.size * kind.itemsize  # about: it decides how sizes are stored
-            with archive.open(entry, "w") as member:
+            with archive.open(f"{key}.npy", "w", force_zip64=array.size * kind.itemsize > MOST_OF_ZIP32) as member:
                 header = {"descr": kind.str, "fortran_order": False, "shape": (array.size,)}
                 np.lib.format.write_array_header_1_0(member, header)
                 for part in array.parts:

@@ -176,6 +176,17 @@ def test_a_level_rectangle_is_the_plane_that_it_shows():
     np.testing.assert_array_equal(plane.heights(x, y), MeshTerrain.from_mesh(SQUARE, FANS).heights(x, y))
 
 
+def test_a_close_up_of_a_whole_walk_is_known_as_the_plane_that_it_is():
+    """As a mesh it would be another terrain than the one that its prints were pressed into, which are pressed again."""
+    count = 800
+    place = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2) * 0.0025
+    first = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    triangles = np.concatenate([first[:, None] + (0, 1, count + 1), first[:, None] + (0, count + 1, count)])
+    vertices = np.column_stack([place, np.zeros(len(place))])
+    assert plane_of(vertices, triangles) is not None
+    assert plane_of(vertices, np.delete(triangles, len(first) // 2 + count // 2, axis=0)) is None
+
+
 @pytest.mark.parametrize(
     ("vertices", "triangles"),
     [
