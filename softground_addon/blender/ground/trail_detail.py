@@ -34,6 +34,8 @@ DETAIL_OF = "softground_detail_of"
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
+INWARD = 1.0 - 1e-6
+"""Where vertices of the outline are compared, from the middle, so that rounding does not leave the ground."""
 
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
@@ -68,16 +70,19 @@ def coarsest(
 ) -> Slices[tuple[Surface, int]]:
     """The faces of a ground, subdivided no more often than its shape needs, and how often; 0 for as it is seen.
 
-    From the first subdivision on vertices lie on one surface, so that only what is between them may be off.
+    From the first subdivision on vertices lie on one surface, so that only what is between them may be off, and the
+    outline: where it is rounded, a coarser one leaves out a part of the ground.
     """
     modifier = ground_surface.subdivision(resolve(name)) if seen else None
     for level in range(1, modifier.levels if modifier else 0):
         coarse = yield from surface_of.slices(resolve(name), unit_scale, frame, level)
         shape = yield from MeshTerrain.from_mesh.slices(coarse.vertices, coarse.triangle_vertices)
         assert seen is not None
+        middle = seen.surface_vertices[:, :2].mean(axis=0)
         for part in ground_surface.parts_of(seen.surface_vertices):
             yield
-            if (np.abs(shape.heights(*part.T[:2]) - part[:, 2]) > FLOOR).any():
+            off = np.abs(shape.heights(*(middle + INWARD * (part[:, :2] - middle)).T) - part[:, 2])
+            if not (off <= FLOOR).all():  # nor where there is no ground
                 break
         else:
             return coarse, level

@@ -208,6 +208,12 @@ def border_of(mesh):
     return uses == 1
 
 
+def is_corner(mesh):
+    uses = np.zeros(len(mesh.vertices), dtype=int)
+    np.add.at(uses, [loop.vertex_index for loop in mesh.loops], 1)
+    return uses == 1
+
+
 def test_the_surface_between_vertices_is_the_evaluated_one(scene):
     ground = coarse_ground(scene)
     modifier = ground.modifiers.new("Smooth", "SUBSURF")
@@ -222,11 +228,16 @@ def test_the_surface_between_vertices_is_the_evaluated_one(scene):
     assert np.abs(in_target - in_source).max() < 1e-4
 
 
-@pytest.mark.parametrize("and_then", ["", "DISPLACE"])
+@pytest.mark.parametrize("and_then", ["", "DISPLACE", "ROUNDED"])
 def test_beside_the_trail_a_ground_is_subdivided_no_more_often_than_its_shape_needs(scene, and_then):
     ground = coarse_ground(scene)
+    if and_then != "ROUNDED":
+        creases = ground.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+        creases.data.foreach_set("value", border_of(ground.data).astype(np.float32))
+        corners = ground.data.attributes.new("crease_vert", "FLOAT", "POINT")
+        corners.data.foreach_set("value", is_corner(ground.data).astype(np.float32))
     ground.modifiers.new("Smooth", "SUBSURF").levels = 6
-    if and_then:
+    if and_then == "DISPLACE":
         ground.modifiers.new("Rough", and_then).strength = 0.0
     seen = ground_surface.undisturbed_surface(ground, 1.0)
     surface, level = trail_detail.coarsest(name_of(ground), seen, 1.0)
@@ -241,8 +252,13 @@ def test_beside_the_trail_a_ground_is_subdivided_no_more_often_than_its_shape_ne
     shown = MeshTerrain.from_mesh(points(detail.data).astype(float), corners)
     x, y, z = seen.surface_vertices.T
     off = np.abs(shown.heights(x, y) - z)
-    assert np.isnan(off).mean() < 0.01  # the rounded corners
+    assert np.isnan(off).mean() < 0.01  # along the outline, by rounding
     assert np.nanmax(off) < trail_detail.FLOOR
+    outline = seen.surface_vertices[:, :2]
+    for end in (np.min, np.max):
+        np.testing.assert_allclose(end(points(detail.data)[:, :2], axis=0), end(outline, axis=0), atol=1e-4)
+    diagonal = (points(detail.data)[:, :2].astype(float) @ (1.0, 1.0)).max()
+    assert diagonal == pytest.approx((outline @ (1.0, 1.0)).max(), abs=1e-4), "its corners are as round"
 
 
 def test_loose_edges_and_vertices_stay(scene):
