@@ -252,11 +252,12 @@ class CarvedGround:
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
             cells, _ = self._read(window)
-            window = window.expanded(step.walls.reach(cells.surface, cells.loose + crumbling, self._cell_size))
+            surface = cells.surface[~cells.closed]
+            window = window.expanded(step.walls.reach(surface, cells.loose + crumbling, self._cell_size))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
             if crumbling:
-                cells.crumble(pieces(window, self._cell_size, crumbling), held)
+                cells.crumble(pieces(window, self._cell_size, crumbling), held, channels[2])
             if not holds and begins:
                 cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
             cells.slide(

@@ -222,8 +222,10 @@ class CarvedCells:
         if others.any() and abs(share) < least:
             self.loose = np.where(thin, shown, self.loose + share * others)
 
-    def crumble(self, deepest: Array, body: Mask) -> None:
-        """Let the edges of walls break off: what breaks lies loose where it stood.
+    def crumble(self, deepest: Array, body: Mask, floor: Array | None = None) -> None:
+        """Let the edges of walls to cut or pressed ground break off: what breaks lies loose where it stood.
+
+        Asked to again, a wall recedes hardly any further: a place breaks off to its depth below what it was.
 
         Parameters
         ----------
@@ -231,14 +233,19 @@ class CarvedCells:
             Depth to which each place may break off [m]; see `pieces`.
         body : (rows, columns) bool array
             Cells with a body in the ground, which holds them.
+        floor : (rows, columns) float array, optional
+            Floor of the layer [m], below which nothing breaks.
         """
         standing = self.standing
-        surface = standing + self.loose
+        lower = ~self.closed & (standing < self.terrain - ROUNDING)
+        surface = np.where(lower, standing + self.loose, np.inf)
         drops = [standing - lowest_within(surface, ceil(part * EDGE / self.cell_size)) for part in (1 / 3, 2 / 3, 1)]
         near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
-        broken = np.minimum(deepest * near, MOST_OF_DROP * np.maximum(drops[-1], 0.0))
-        broken[self.closed | self.contact | body] = 0.0
-        breaks = broken > 0
+        before = np.maximum(np.minimum(self.pressed, self.terrain) - standing, 0.0)
+        broken = np.minimum(deepest * near - before, MOST_OF_DROP * drops[-1])
+        if floor is not None:
+            broken = np.minimum(broken, standing - floor)
+        breaks = (broken > 0) & ~(self.closed | self.contact | body)
         self.lowest[:, breaks] = (np.minimum(self.pressed, self.lowest) - broken)[:, breaks]
         fallen = standing - self.standing
         self.cut_height += float(fallen.sum())

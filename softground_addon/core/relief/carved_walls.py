@@ -23,10 +23,10 @@ ROUGHNESS = 0.012
 
 
 def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> tuple[Array, Array]:
-    """Lowest and highest change of height by relief at places, (K,) and (K,) [m]; infinite where no body carves.
+    """Lowest and highest change of height by relief at places, (K,) and (K,) [m].
 
-    Carved ground with relief lies between the lowest and the highest ground that is displayed within `REACH`, to
-    `ROUGHNESS`.
+    Infinite where no body carves, and where the carved ground has no wall. Near one, ground with relief lies
+    between the lowest and the highest that is displayed within `REACH`, to `ROUGHNESS`.
 
     Parameters
     ----------
@@ -50,6 +50,8 @@ def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> 
         cell = window.cells_under(x, y, size)
         compression, rim = ground.sample(x, y)
         here = rim - compression
-        low[point] = lowest_within(heights, reach)[cell] - here - ROUGHNESS
-        high[point] = -lowest_within(-heights, reach)[cell] - here + ROUGHNESS
+        lowest, highest = lowest_within(heights, reach)[cell], -lowest_within(-heights, reach)[cell]
+        walls = highest - lowest > ROUGHNESS
+        low[point[walls]] = (lowest - here - ROUGHNESS)[walls]
+        high[point[walls]] = (highest - here + ROUGHNESS)[walls]
     return low, high

@@ -233,3 +233,36 @@ def test_a_body_in_the_ground_holds_the_wall_and_mud_flows():
     cells.crumble(pieces(window, 0.01, walls.crumbling), np.ones(cells.loose.shape, bool))
     assert cells.cut_height == 0.0
     assert walls_of("mud").crumbling == walls_of("sand").crumbling == 0.0
+
+
+def test_walls_recede_hardly_further_however_many_go_by():
+    cells, walls, window = trench(0.01, "snow")
+    nobody = np.zeros(cells.loose.shape, bool)
+    cells.crumble(pieces(window, 0.01, walls.crumbling), nobody)
+    cells.slide(walls, nobody, (window.row, window.column), 300)
+    once = cells.cut_height
+    for _ in range(8):
+        cells.crumble(pieces(window, 0.01, walls.crumbling), nobody)
+        cells.slide(walls, nobody, (window.row, window.column), 300)
+    assert cells.cut_height < 1.3 * once
+
+
+@pytest.mark.parametrize("height", [0.0, 5.0])
+def test_neither_the_edge_of_a_ground_nor_a_bank_that_nobody_cut_breaks(height):
+    cells, walls, window = trench(0.01, "snow", bottom=np.inf)
+    cells.terrain = np.full_like(cells.terrain, height)
+    cells.terrain[:, 30:] -= 0.2
+    cells.pressed = cells.terrain.copy()
+    cells.closed[:10], cells.terrain[:10], cells.pressed[:10] = True, 0.0, 0.0
+    cells.crumble(pieces(window, 0.01, walls.crumbling), np.zeros(cells.loose.shape, bool))
+    assert cells.cut_height == 0.0
+
+
+def test_nothing_breaks_below_the_floor_of_the_layer():
+    cells, walls, window = trench(0.01, "snow")
+    floor = np.full(cells.loose.shape, -0.3)
+    floor[:30] = -0.02
+    cells.crumble(pieces(window, 0.01, walls.crumbling), np.zeros(cells.loose.shape, bool), floor)
+    uncut = cells.lowest[0] > -0.29
+    assert (cells.standing[:30][uncut[:30]] >= -0.02 - 1e-12).all()
+    assert cells.cut_height > 0.0

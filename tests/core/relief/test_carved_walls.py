@@ -79,3 +79,20 @@ def test_beyond_the_carve_relief_is_what_it_was(steps):
     low, high = room([first, second], Places(x, y), 0.005)
     assert np.isinf(low).all()
     assert np.isinf(high).all()
+
+
+def test_tread_on_the_floor_of_a_print_is_what_it_was(steps):
+    first = steps[0]
+    x, y = (axis.ravel() for axis in np.meshgrid(*first.window.centres(CELL)))
+    footprints = [first, carve_around(first)]
+    compression, rim = blurred(recompose(footprints), POWDER.blur_sigma).read(first.window)
+    around = 2 * round(REACH / CELL + 1) + 1
+    flat = np.ptp([f(rim - compression, around) for f in (minimum_filter, maximum_filter)], axis=0).ravel() < ROUGHNESS
+    pressed = flat & (compression.ravel() > CUT)
+    assert pressed.sum() > 20
+    settings = ReliefSettings(amounts.of_look("snow"), strength=5.0)
+    shown = [
+        all_together(relief_of_steps(each, x, y, settings, blur_sigma=POWDER.blur_sigma), len(x))
+        for each in (footprints[:1], footprints)
+    ]
+    np.testing.assert_array_equal(shown[1][pressed], shown[0][pressed])
