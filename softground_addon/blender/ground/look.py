@@ -40,10 +40,13 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
 
 
 def take_off(obj: bpy.types.Object) -> None:
-    """Give an object the user's materials back, over which the add-on's were mixed."""
+    """Give an object the user's materials back, over which the add-on's were mixed; mixed ones that went with a copy of
+    a ground go, too."""
     for slot in _writable_slots(obj):
         if (mixed := slot.material) and (under := mixed.get(OVER)):
             _replace(slot, under)
+    unused = [each for each in bpy.data.materials if each.get(OVER) and not (each.users or each.library)]
+    bpy.data.batch_remove(unused)
 
 
 def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:

@@ -7,7 +7,7 @@ from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.materials.materials import MARK, OVER
 from softground_addon.blender.panels import preset_menu
 from softground_addon.core.ground import presets
-from tests.blender.grounds import plane
+from tests.blender.grounds import field, plane
 
 
 def surfaces(ground):
@@ -101,3 +101,17 @@ def test_the_menu_says_that_a_preset_was_modified(scene, tmp_path, monkeypatch):
     assert preset_menu.title_of_ground(scene.softground) == "My Bog (modified)"
     bpy.ops.softground.remove_preset()
     assert preset_menu.title_of_ground(scene.softground) == "My Bog"
+
+
+def test_clear_leaves_no_mixed_material_of_a_ground_with_a_finer_copy(short_walk):
+    ground = field(short_walk)
+    mine = bpy.data.materials.new("Grass")
+    ground.data.materials.append(mine)
+    users = mine.users
+    bpy.ops.softground.bake()
+    assert baked_ground.display_mesh_of(ground) != ground
+    assert bpy.ops.softground.apply_look() == {"FINISHED"}
+    assert any(material.get(OVER) == mine for material in bpy.data.materials)
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert not any(material.get(OVER) for material in bpy.data.materials)
+    assert mine.users == users
