@@ -343,7 +343,7 @@ def _given(
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
-    reading = trail_detail.coarsest.slices(name, surface, unit_scale, frame)
+    reading = trail_detail.coarsest.slices(name, surface, unit_scale, cell_size, frame)
     coarse, level = yield from meanwhile(Progress("write", 0.1), reading)
     refinement = yield from meanwhile(
         Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), cell_size, closer)

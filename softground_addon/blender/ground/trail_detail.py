@@ -34,6 +34,8 @@ DETAIL_OF = "softground_detail_of"
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
+OF_CELL = 0.02
+"""Part of a cell by which a ground may be off its shape."""
 INWARD = 1.0 - 1e-6
 """Where vertices of the outline are compared, from the middle, so that rounding does not leave the ground."""
 
@@ -66,14 +68,17 @@ def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
 
 @sliced
 def coarsest(
-    name: ObjectName, seen: GroundSurface | None, unit_scale: float, frame: GroundFrame | None = None
+    name: ObjectName, seen: GroundSurface | None, unit_scale: float, cell_size: float, frame: GroundFrame | None = None
 ) -> Slices[tuple[Surface, int]]:
     """The faces of a ground, subdivided no more often than its shape needs, and how often; 0 for as it is seen.
+
+    Its shape may be off by `FLOOR`, or by a part of a cell if that is less.
 
     From the first subdivision on vertices lie on one surface, so that only what is between them may be off, and the
     outline: where it is rounded, a coarser one leaves out a part of the ground.
     """
     modifier = ground_surface.subdivision(resolve(name)) if seen else None
+    tolerance = min(FLOOR, OF_CELL * cell_size)
     for level in range(1, modifier.levels if modifier else 0):
         coarse = yield from surface_of.slices(resolve(name), unit_scale, frame, level)
         shape = yield from MeshTerrain.from_mesh.slices(coarse.vertices, coarse.triangle_vertices)
@@ -82,7 +87,7 @@ def coarsest(
         for part in ground_surface.parts_of(seen.surface_vertices):
             yield
             off = np.abs(shape.heights(*(middle + INWARD * (part[:, :2] - middle)).T) - part[:, 2])
-            if not (off <= FLOOR).all():  # nor where there is no ground
+            if not (off <= tolerance).all():  # nor where there is no ground
                 break
         else:
             return coarse, level

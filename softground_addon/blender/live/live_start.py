@@ -126,7 +126,7 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
             ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame
         ):
-            reading = trail_detail.coarsest.slices(name, shot.surface, unit_scale, frame)
+            reading = trail_detail.coarsest.slices(name, shot.surface, unit_scale, cell_size, frame)
             coarse, level = yield from meanwhile(PLACING, reading)
             region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
             refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
