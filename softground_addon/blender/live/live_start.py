@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.composers.pressed_shot import shares_of
+from ...core.errors import InputError
 from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
@@ -26,11 +28,18 @@ from ..ground.modified_prints import are_undone
 from ..jobs import Job, Progress, meanwhile
 from ..reading import analysis
 from ..reading.shots import Shot, ground_of, settings_of
+from ..translation import translated
 from .live_ground import LiveGround
 from .live_mode import LiveMode
 from .live_part import LivePart, touched
 
 PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
+
+
+def bake_in_the_way(options: Any) -> str:
+    """Why live mode cannot start on the grounds of a scene, whose bakes it would replace; empty if it can."""
+    baked = next(filter(baked_ground.is_baked, settings.grounds_of(options)), None)
+    return translated("There is a bake on '{name}': clear it first", name=baked.name) if baked else ""
 
 
 def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
@@ -39,8 +48,10 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
     Raises
     ------
     InputError
-        If the scene could not be baked either.
+        If the scene could not be baked either, or a bake is on one of its grounds.
     """
+    if fault := bake_in_the_way(scene.softground):
+        raise InputError(fault)
     wanted = settings_of(scene)
     known = yield from analysis.reading(scene)
     check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)

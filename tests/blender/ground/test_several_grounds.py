@@ -14,7 +14,7 @@ from softground_addon.blender.baking import bake_job, bake_report, clean_feet, s
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.live import live
+from softground_addon.blender.live import live, live_start
 from softground_addon.blender.output import event_points, export_formats, sound_exports
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
@@ -450,6 +450,19 @@ def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_tha
     assert not live.is_on()
     bpy.ops.softground.clear_bake()
     assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_live_mode_waits_until_no_ground_has_a_bake(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.clear_bake(only_shown=True)
+    assert not bpy.ops.softground.live.poll()
+    with pytest.raises(InputError, match="There is a bake on 'Crate'"):
+        jobs.run(live_start.starting(scene))
+    assert prints_on(crate)
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.live.poll()
 
 
 def test_what_moves_or_is_no_ground_is_refused(crate):
