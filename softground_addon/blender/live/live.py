@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
-from .. import session, settings
+from .. import session
 from ..remedies import said
 from ..state import state
 from ..translation import translated
@@ -102,9 +102,7 @@ def is_answering() -> bool:
 def refusal() -> str:
     """Reason why live mode does not press with the present settings, or why it has ended; empty if it does."""
     scene = _scene()
-    if state.live is None or scene is None or not state.live.has_refused:
-        return state.live_ended
-    return state.live.refusal(settings.snapshot(scene))
+    return state.live_ended if state.live is None or scene is None else state.live.refusal(scene)
 
 
 def begin(mode: LiveMode) -> None:

@@ -70,7 +70,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
     if wanted.ground is None:
         wanted, known = replace(wanted, ground=settings.name_of(shown[0])), analysis.read(scene)
     owners = wanted.soft_grounds
-    parts = [LivePart(n, owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
+    parts = [LivePart(owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
     return LiveMode(scene, wanted, known, parts)
 
 

@@ -437,6 +437,44 @@ def test_live_mode_says_why_it_does_not_follow_where_steps_come_onto_another_gro
     live.discard()
 
 
+def in_live_mode_over_a_slab(crate):
+    """A slab at the floor's start, which is stepped on too; with the floor and a crate in live mode."""
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.004, y=(LOW - 1.2, LOW - 0.2))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(84)
+    bpy.ops.softground.live()
+    return slab
+
+
+def all_answered():
+    while live.is_answering():
+        live.answer(0.0)
+
+
+def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_again(crate):
+    scene = bpy.context.scene
+    floor, slab = scene.softground.ground, in_live_mode_over_a_slab(crate)
+    before = shown_on(floor, crate, slab)
+    scene.softground.active_ground = 0
+    bpy.ops.softground.remove_ground()
+    all_answered()
+    assert "'Crate' is not among the grounds any more" in live.refusal()
+    scene.frame_set(83)
+    assert live.is_on()
+    also(crate)
+    scene.frame_set(84)
+    bpy.context.view_layer.update()
+    all_answered()
+    assert live.refusal() == ""
+    for now, then in zip(shown_on(floor, crate, slab), before, strict=True):
+        assert now == pytest.approx(then, abs=1e-6)
+    bpy.ops.softground.live(keep=True)
+    assert [record_of(each).about["inputs"]["ground"] for each in (floor, crate, slab)] == ["Field", CRATE, "Slab"]
+    assert len(below(prints_on(crate))) == len(prints_on(crate)) >= 2
+
+
 def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
     scene = bpy.context.scene
     slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
