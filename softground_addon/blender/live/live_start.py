@@ -22,6 +22,7 @@ from ...core.numerics.arrays import Array, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
 from ...core.settings import BakeSettings
 from .. import settings
+from ..baking import bake_report
 from ..baking.bake_checks import coverage, wants_detail
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.modified_prints import are_undone
@@ -67,6 +68,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         yield PRESSING
         with analysis.own_changes(scene):
             shown = [_put_on(*each, made_with=wanted.of_each_ground[n]) for n, each in zip(numbers, ready, strict=True)]
+            bake_report.note_prints(scene.softground)  # for a file that is saved meanwhile
     if wanted.ground is None:
         wanted, known = replace(wanted, ground=settings.name_of(shown[0])), analysis.read(scene)
     owners = wanted.soft_grounds

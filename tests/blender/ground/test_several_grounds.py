@@ -475,6 +475,22 @@ def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_a
     assert len(below(prints_on(crate))) == len(prints_on(crate)) >= 2
 
 
+def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clears(crate, tmp_path):
+    options = bpy.context.scene.softground
+    also(crate)
+    bpy.context.scene.frame_set(60)
+    bpy.ops.softground.live()
+    assert [item.object for item in options.printed] == [options.ground, crate]
+    options.printed.clear()
+    bpy.ops.softground.remove_ground()
+    assert bake_report.unlisted(options) == [crate]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.clear_unlisted() == {"FINISHED"}
+    assert not any(map(baked_ground.has_remains, bpy.data.objects))
+
+
 def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
     scene = bpy.context.scene
     slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
