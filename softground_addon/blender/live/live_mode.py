@@ -150,10 +150,8 @@ class LiveMode:
 
     def _is_another(self, scene: bpy.types.Scene, asked: BakeSettings) -> bool:
         """True if settings or animation differ from those that are being pressed, or were last."""
-        if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
-            return False  # another ground wants another live mode
         if self._left_out(scene):
-            return False
+            return False  # other grounds want another live mode
         if self._refused and self._refused[0] == asked and analysis.known(scene, asked) is self._refused[1]:
             return False
         if self._answering is None and analysis.known(scene, asked) is not self._analysis:

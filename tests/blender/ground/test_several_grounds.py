@@ -475,6 +475,26 @@ def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_a
     assert len(below(prints_on(crate))) == len(prints_on(crate)) >= 2
 
 
+def test_live_mode_goes_on_when_another_of_its_grounds_is_shown_and_says_why_not_where_one_is_replaced(crate):
+    options = bpy.context.scene.softground
+    floor, slab = options.ground, in_live_mode_over_a_slab(crate)
+    before = shown_on(floor, crate, slab)
+    bpy.ops.softground.choose_ground(object=CRATE)
+    all_answered()
+    for now, then in zip(shown_on(floor, crate, slab), before, strict=True):
+        assert now == pytest.approx(then, abs=1e-6)
+    options.material.youngs_modulus /= 2
+    assert live.is_answering()
+    all_answered()
+    assert live.refusal() == ""
+    assert (before[1] - shown_on(crate)[0]).max() > 0.005
+    options.ground = slab
+    all_answered()
+    assert "'Crate' is not among the grounds any more" in live.refusal()
+    live.discard()
+    assert not any(map(baked_ground.has_remains, (floor, crate, slab)))
+
+
 def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clears(crate, tmp_path):
     options = bpy.context.scene.softground
     also(crate)
