@@ -245,7 +245,14 @@ class LiveMode:
         return touching, self._parts[0].playhead.ground.cell_size, self._wanted.material.rim_reach
 
     def keeping(self, scene: bpy.types.Scene) -> jobs.Job[None]:
-        """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them."""
+        """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them.
+
+        Raises
+        ------
+        InputError
+            If one of them cannot be changed; then all are as they were.
+        """
+        self._check_writable()
         now = jobs.Progress("simulate", 0.0)
         with suppress(InputError):  # then the last ground is kept
             if self.has_more(scene):
@@ -318,9 +325,16 @@ class LiveMode:
         return publish(baked, debris, place, made_with), baked.footprints
 
     def discard(self) -> None:
-        """Leave the grounds as they were before."""
+        """Leave the grounds as they were before; all as they are if one of them cannot be changed (InputError)."""
+        self._check_writable()
         for part in self._parts:
             part.discard()
+        if scene := self.current_scene():
+            bake_report.note_prints(scene.softground)
+
+    def _check_writable(self) -> None:
+        for part in self._parts:
+            part.check_writable()
 
 
 _ENDED = object()

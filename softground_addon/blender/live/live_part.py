@@ -94,11 +94,19 @@ class LivePart:
         if obj is not None:
             self.show(obj, windows, wanted)
 
+    def check_writable(self) -> None:
+        """Raise InputError if the ground is there and cannot be changed, as in Edit Mode."""
+        if ground := self._ground():
+            baked_ground.check_writable(ground)
+
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        ground = settings.find(self.owner) or self.ground.object(None)
-        if ground is not None:
+        if ground := self._ground():
             baked_ground.clear(ground)
+
+    def _ground(self) -> bpy.types.Object | None:
+        """The ground, or what showed its prints; None if both were deleted."""
+        return settings.find(self.owner) or self.ground.object(None)
 
 
 def touched(loads: Sequence[CharacterLoads]) -> bool:

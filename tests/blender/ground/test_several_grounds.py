@@ -1,6 +1,7 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -493,6 +494,25 @@ def test_live_mode_goes_on_when_another_of_its_grounds_is_shown_and_says_why_not
     assert "'Crate' is not among the grounds any more" in live.refusal()
     live.discard()
     assert not any(map(baked_ground.has_remains, (floor, crate, slab)))
+
+
+@pytest.mark.parametrize("name", ["Field", CRATE])
+def test_live_mode_changes_none_of_its_grounds_while_one_is_in_edit_mode(crate, name):
+    floor = bpy.context.scene.softground.ground
+    also(crate)
+    bpy.context.scene.frame_set(60)
+    bpy.ops.softground.live()
+    before = fingerprints.of_file()
+    bpy.context.view_layer.objects.active = baked_ground.display_mesh_of(bpy.data.objects[name])
+    for keep in (True, False):
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert "is in Edit Mode: leave it with Tab first" in refusal(partial(bpy.ops.softground.live, keep=keep))
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert fingerprints.differences(before, fingerprints.of_file()) == []
+    assert live.is_on()
+    bpy.ops.softground.live()
+    assert not any(map(baked_ground.has_remains, (floor, crate)))
+    assert len(bpy.context.scene.softground.printed) == 0
 
 
 def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clears(crate, tmp_path):
