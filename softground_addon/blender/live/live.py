@@ -41,7 +41,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
     if depsgraph is not None and depsgraph.mode == "RENDER":
         return
     if not state.live.follow(scene):
-        forget()
+        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
 
 
 def in_contact(uid: int) -> Contact | None:
@@ -61,7 +61,7 @@ def after_undo() -> None:
     """Handle an undo or redo: the mesh is replaced; live mode goes on if the new one is its own."""
     scene = _scene()
     if state.live is not None and (scene is None or not state.live.show_anew(scene)):
-        forget()
+        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
 
 
 def answer(seconds: float | None = None) -> float | None:

@@ -542,6 +542,7 @@ def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_tha
     bpy.data.objects.remove(baked_ground.display_mesh_of(crate))
     scene.frame_set(61)
     assert not live.is_on()
+    assert live.refusal().startswith("Live mode has ended: a ground or its prints are gone")
     bpy.ops.softground.clear_bake()
     assert not baked_ground.has_remains(scene.softground.ground)
 
