@@ -135,7 +135,7 @@ def before_load(*_: Any) -> None:
     modal_job.stop()
     try:
         live.discard()
-    except InputError:  # a ground in Edit Mode keeps its prints, for Clear Bake
+    except InputError:  # with one in Edit Mode all keep their prints, for Clear Bake
         live.forget()
     analysis.forget()
     tread_images.forget()

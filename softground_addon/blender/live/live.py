@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
-from .. import session, settings
+from .. import session
 from ..remedies import said
 from ..state import state
 from ..translation import translated
@@ -41,7 +41,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
     if depsgraph is not None and depsgraph.mode == "RENDER":
         return
     if not state.live.follow(scene):
-        forget()
+        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
 
 
 def in_contact(uid: int) -> Contact | None:
@@ -61,7 +61,7 @@ def after_undo() -> None:
     """Handle an undo or redo: the mesh is replaced; live mode goes on if the new one is its own."""
     scene = _scene()
     if state.live is not None and (scene is None or not state.live.show_anew(scene)):
-        forget()
+        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
 
 
 def answer(seconds: float | None = None) -> float | None:
@@ -102,9 +102,7 @@ def is_answering() -> bool:
 def refusal() -> str:
     """Reason why live mode does not press with the present settings, or why it has ended; empty if it does."""
     scene = _scene()
-    if state.live is None or scene is None or not state.live.has_refused:
-        return state.live_ended
-    return state.live.refusal(settings.snapshot(scene))
+    return state.live_ended if state.live is None or scene is None else state.live.refusal(scene)
 
 
 def begin(mode: LiveMode) -> None:

@@ -150,23 +150,26 @@ class LiveMode:
 
     def _is_another(self, scene: bpy.types.Scene, asked: BakeSettings) -> bool:
         """True if settings or animation differ from those that are being pressed, or were last."""
-        if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
-            return False  # another ground wants another live mode
-        if self._refused and self.refusal(asked) and analysis.known(scene, asked) is self._refused[1]:
+        if self._left_out(scene):
+            return False  # other grounds want another live mode
+        if self._refused and self._refused[0] == asked and analysis.known(scene, asked) is self._refused[1]:
             return False
         if self._answering is None and analysis.known(scene, asked) is not self._analysis:
             return True
         last = self._wanted if self._answering is None else self._asked
         return last is None or (asked != last and _pressed_by(asked) != _pressed_by(last))
 
-    @property
-    def has_refused(self) -> bool:
-        """True if there were settings that it did not press with."""
-        return self._refused is not None
+    def _left_out(self, scene: bpy.types.Scene) -> str:
+        """Name of a part that is not among the grounds of its scene any more; empty where all are."""
+        listed = {ground.session_uid for ground in settings.grounds_of(scene.softground)}
+        return next((part.owner.name for part in self._parts if part.owner.uid not in listed), "")
 
-    def refusal(self, asked: BakeSettings) -> str:
-        """Reason why settings are not pressed; empty if they are, or were not tried."""
-        return self._refused[2] if self._refused is not None and self._refused[0] == asked else ""
+    def refusal(self, scene: bpy.types.Scene) -> str:
+        """Reason why the present settings are not pressed; empty if they are, or were not tried."""
+        if name := self._left_out(scene):
+            return translated("'{name}' is not among the grounds any more: list it again, or end live mode", name=name)
+        refused = self._refused
+        return refused[2] if refused and refused[0] == settings.snapshot(scene) else ""
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
         """Press the shot up to the frame that is shown: the newest steps onto the present ground, then all of them."""
@@ -183,14 +186,15 @@ class LiveMode:
         wholes = [part.playhead for part in self._parts]
         if not self._presses_like(known, asked):
             shares = yield from self._shared(known, asked)
-            if fault := self._not_shown(shares):
+            numbers = [part.number_in(asked) for part in self._parts]
+            if fault := _not_shown(shares, numbers):
                 self._refused = asked, known, fault
                 return
             if self._parts[0].playhead.ground.cell_size == asked.cell_size_m:
-                for part in self._parts:
-                    yield from part.pressing_newest(self.current_scene(), asked, known.shot, shares[part.number])
+                for part, number in zip(self._parts, numbers, strict=True):
+                    yield from part.pressing_newest(self.current_scene(), asked, known.shot, shares[number])
             self._can_start_over = True
-            wholes = [self._begun(part, known, asked, shares[part.number]) for part in self._parts]
+            wholes = [self._begun(*each, known, asked, shares) for each in zip(self._parts, numbers, strict=True)]
             for whole in wholes:
                 while whole.advance(self._frame()):
                     yield
@@ -208,23 +212,15 @@ class LiveMode:
             self._shares = known, landing, (yield from sharing)
         return self._shares[2]
 
-    def _not_shown(self, shares: _Shares) -> str:
-        """Reason if soles touch a ground that does not follow the timeline, or there are fewer grounds than before."""
-        followed = {part.number for part in self._parts}
-        others = {number for number, loads in enumerate(shares) if touched(loads)} - followed
-        if not others and max(followed) < len(shares):
-            return ""
-        return translated("Steps are on other grounds by now: end live mode, and start it again")
-
     def _begun(
-        self, part: LivePart, known: analysis.Analysis, asked: BakeSettings, loads: Sequence[CharacterLoads]
+        self, part: LivePart, number: int, known: analysis.Analysis, asked: BakeSettings, shares: _Shares
     ) -> Playhead:
-        """A simulation of a part by other settings, at its beginning."""
+        """A simulation of a part, the ground of a number, by other settings, at its beginning."""
         undisturbed = part.playhead.undisturbed
         looked_up = known.shot is self._analysis.shot and undisturbed.cell_size == asked.cell_size_m
         return Playhead(
-            loads,
-            ground_of(asked.of_each_ground[part.number], known.shot.of_each_ground[part.number]),
+            shares[number],
+            ground_of(asked.of_each_ground[number], known.shot.of_each_ground[number]),
             asked.cell_size_m,
             undisturbed=undisturbed if looked_up else None,
         )
@@ -249,7 +245,14 @@ class LiveMode:
         return touching, self._parts[0].playhead.ground.cell_size, self._wanted.material.rim_reach
 
     def keeping(self, scene: bpy.types.Scene) -> jobs.Job[None]:
-        """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them."""
+        """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them.
+
+        Raises
+        ------
+        InputError
+            If one of them cannot be changed; then all are as they were.
+        """
+        self._check_writable()
         now = jobs.Progress("simulate", 0.0)
         with suppress(InputError):  # then the last ground is kept
             if self.has_more(scene):
@@ -261,7 +264,7 @@ class LiveMode:
             return
         names, shot = [settings.name_of(obj) for obj in shown], self._analysis.shot
         made_with = self._kept_with(settings.snapshot(scene))
-        of_each = [made_with.of_each_ground[part.number] for part in self._parts]
+        of_each = [made_with.of_each_ground[part.number_in(made_with)] for part in self._parts]
         movers = [staleness.of_movers(scene.objects, each) for each in of_each]
         pressed = []
         for part in self._parts:
@@ -308,7 +311,7 @@ class LiveMode:
         self, part: LivePart, name: ObjectName, made_with: BakeSettings, footprints: list[Footprint]
     ) -> jobs.Job[tuple[jobs.Job[Published], Sequence[Footprint]]]:
         """The job that publishes the prints of a part on the object of a name, and these."""
-        now, shot = jobs.Progress("simulate", 0.0), self._analysis.shot.of_each_ground[part.number]
+        now, shot = jobs.Progress("simulate", 0.0), self._analysis.shot.of_each_ground[part.number_in(self._wanted)]
         vertices = ground_surface.rest_vertices(settings.resolve(name), made_with.unit_scale_m, made_with.frame)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
         shown = yield from jobs.meanwhile(now, pressing)
@@ -322,9 +325,16 @@ class LiveMode:
         return publish(baked, debris, place, made_with), baked.footprints
 
     def discard(self) -> None:
-        """Leave the grounds as they were before."""
+        """Leave the grounds as they were before; all as they are if one of them cannot be changed (InputError)."""
+        self._check_writable()
         for part in self._parts:
             part.discard()
+        if scene := self.current_scene():
+            bake_report.note_prints(scene.softground)
+
+    def _check_writable(self) -> None:
+        for part in self._parts:
+            part.check_writable()
 
 
 _ENDED = object()
@@ -339,6 +349,13 @@ def _in_steps(job: jobs.Job[jobs.Result]) -> Generator[None, None, jobs.Result]:
             result: jobs.Result = end.value
             return result
         yield
+
+
+def _not_shown(shares: _Shares, followed: Sequence[int]) -> str:
+    """Reason if soles touch a ground that does not follow the timeline, by the numbers of those that do."""
+    if {number for number, loads in enumerate(shares) if touched(loads)} <= {*followed}:
+        return ""
+    return translated("Steps are on other grounds by now: end live mode, and start it again")
 
 
 def _pressed_by(wanted: BakeSettings) -> dict[str, Any]:

@@ -24,8 +24,6 @@ class LivePart:
 
     Attributes
     ----------
-    number : int
-        Of the ground among all of the shot.
     owner : ObjectName
         The ground, which may be shown by a copy along the trail.
     ground : LiveGround
@@ -34,16 +32,19 @@ class LivePart:
         Where something else is shown at the moment.
     """
 
-    number: int
     owner: ObjectName
     ground: LiveGround
     playhead: Playhead
     drawn_over: list[Window] = field(default_factory=list)
 
+    def number_in(self, wanted: BakeSettings) -> int:
+        """Number of the ground among all of some settings, which have it."""
+        return [name.uid for name in wanted.soft_grounds].index(self.owner.uid)
+
     def object(self, scene: bpy.types.Scene | None) -> bpy.types.Object | None:
         """What shows the prints; None if it is gone or no longer as live mode made it."""
         listed = settings.listed_grounds(scene.softground) if scene else []
-        ground = listed[self.number] if self.number < len(listed) else None
+        ground = next((each for each in listed if each.session_uid == self.owner.uid), None)
         return self.ground.object(ground and baked_ground.display_mesh_of(ground))
 
     def go_to(self, obj: bpy.types.Object, frame: float, wanted: BakeSettings) -> None:
@@ -55,7 +56,7 @@ class LivePart:
 
     def show(self, obj: bpy.types.Object, windows: Sequence[Window], wanted: BakeSettings) -> None:
         """Show changes in some windows, and wherever something else was shown in the meantime."""
-        sigma = wanted.of_each_ground[self.number].material.blur_sigma
+        sigma = wanted.of_each_ground[self.number_in(wanted)].material.blur_sigma
         self.ground.show(obj, self.playhead, [*windows, *self.drawn_over], sigma, wanted.frame_rate)
         self.drawn_over = []
 
@@ -72,7 +73,8 @@ class LivePart:
         since, shown = self.playhead.before_newest(), self.playhead.frame
         if since - self.playhead.first_frame < shown - since:
             return
-        made_with, part = asked.of_each_ground[self.number], shot.of_each_ground[self.number]
+        number = self.number_in(asked)
+        made_with, part = asked.of_each_ground[number], shot.of_each_ground[number]
         newest = self.playhead.pressed_anew(since, loads, ground_of(made_with, part))
         while newest.advance(shown):
             yield
@@ -92,11 +94,19 @@ class LivePart:
         if obj is not None:
             self.show(obj, windows, wanted)
 
+    def check_writable(self) -> None:
+        """Raise InputError if the ground is there and cannot be changed, as in Edit Mode."""
+        if ground := self._ground():
+            baked_ground.check_writable(ground)
+
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        ground = settings.find(self.owner) or self.ground.object(None)
-        if ground is not None:
+        if ground := self._ground():
             baked_ground.clear(ground)
+
+    def _ground(self) -> bpy.types.Object | None:
+        """The ground, or what showed its prints; None if both were deleted."""
+        return settings.find(self.owner) or self.ground.object(None)
 
 
 def touched(loads: Sequence[CharacterLoads]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.composers.pressed_shot import shares_of
+from ...core.errors import InputError
 from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
@@ -20,17 +22,25 @@ from ...core.numerics.arrays import Array, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
 from ...core.settings import BakeSettings
 from .. import settings
+from ..baking import bake_report
 from ..baking.bake_checks import coverage, wants_detail
 from ..ground import baked_ground, created_ground, ground_surface, trail_detail
 from ..ground.modified_prints import are_undone
 from ..jobs import Job, Progress, meanwhile
 from ..reading import analysis
 from ..reading.shots import Shot, ground_of, settings_of
+from ..translation import translated
 from .live_ground import LiveGround
 from .live_mode import LiveMode
 from .live_part import LivePart, touched
 
 PLACING, PRESSING = Progress("simulate", 0.0), Progress("simulate", 0.5)
+
+
+def bake_in_the_way(options: Any) -> str:
+    """Why live mode cannot start on the grounds of a scene, whose bakes it would replace; empty if it can."""
+    baked = next(filter(baked_ground.is_baked, settings.grounds_of(options)), None)
+    return translated("There is a bake on '{name}': clear it first", name=baked.name) if baked else ""
 
 
 def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
@@ -39,8 +49,10 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
     Raises
     ------
     InputError
-        If the scene could not be baked either.
+        If the scene could not be baked either, or a bake is on one of its grounds.
     """
+    if fault := bake_in_the_way(scene.softground):
+        raise InputError(fault)
     wanted = settings_of(scene)
     known = yield from analysis.reading(scene)
     check_cell_size(known.loads, wanted.fineness, wanted.longest_bake_s)
@@ -56,10 +68,11 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         yield PRESSING
         with analysis.own_changes(scene):
             shown = [_put_on(*each, made_with=wanted.of_each_ground[n]) for n, each in zip(numbers, ready, strict=True)]
+            bake_report.note_prints(scene.softground)  # for a file that is saved meanwhile
     if wanted.ground is None:
         wanted, known = replace(wanted, ground=settings.name_of(shown[0])), analysis.read(scene)
     owners = wanted.soft_grounds
-    parts = [LivePart(n, owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
+    parts = [LivePart(owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
     return LiveMode(scene, wanted, known, parts)
 
 

@@ -58,6 +58,7 @@ class SOFTGROUND_OT_remove_ground(RemovesChosen):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         options = settings.options_of(context)
+        bake_report.note_prints(options)
         ground, done = chosen_of(options, *self.of_list).object, super().execute(context)
         if ground in bake_report.unlisted(options):
             text = "'{name}' keeps its prints: clear them, or list it again, in the Ground panel"

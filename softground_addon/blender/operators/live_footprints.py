@@ -9,7 +9,6 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import jobs, session, settings
-from ..ground import baked_ground
 from ..live import live, live_mode, live_start
 from ..reading import analysis
 from ..state import state
@@ -35,7 +34,7 @@ class SOFTGROUND_OT_live(ModalJob):
         """True if live mode can start or end; otherwise the button says what is missing."""
         reason = _why_not(context)
         if reason:
-            cls.poll_message_set(translated(reason))
+            cls.poll_message_set(reason)
         return not reason
 
     @classmethod
@@ -73,11 +72,10 @@ class SOFTGROUND_OT_live(ModalJob):
 def _why_not(context: bpy.types.Context) -> str:
     """Reason why live mode can neither start nor end, or an empty text."""
     if live.is_on():
-        return BUSY if session.current().is_baking else ""
-    ground = settings.options_of(context).ground
-    if ground and baked_ground.is_baked(ground):
-        return why_no_start(context) or "There is a bake on the ground: clear it first"
-    return why_no_start(context)
+        return translated(BUSY) if session.current().is_baking else ""
+    if reason := why_no_start(context):
+        return translated(reason)
+    return live_start.bake_in_the_way(settings.options_of(context))
 
 
 CLASSES = (SOFTGROUND_OT_live,)

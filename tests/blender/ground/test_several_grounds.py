@@ -1,6 +1,7 @@
 """Several soft grounds in one shot: a floor, a crate and stairs, each with prints of its own."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -14,7 +15,7 @@ from softground_addon.blender.baking import bake_job, bake_report, clean_feet, s
 from softground_addon.blender.baking.publish import READY
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.live import live
+from softground_addon.blender.live import live, live_start
 from softground_addon.blender.output import event_points, export_formats, sound_exports
 from softground_addon.blender.panels import panels
 from softground_addon.blender.playback import weather_modifier
@@ -437,6 +438,99 @@ def test_live_mode_says_why_it_does_not_follow_where_steps_come_onto_another_gro
     live.discard()
 
 
+def in_live_mode_over_a_slab(crate):
+    """A slab at the floor's start, which is stepped on too; with the floor and a crate in live mode."""
+    scene = bpy.context.scene
+    slab = box(scene, "Slab", 0.004, y=(LOW - 1.2, LOW - 0.2))
+    bpy.context.view_layer.update()
+    also(crate, slab)
+    scene.frame_set(84)
+    bpy.ops.softground.live()
+    return slab
+
+
+def all_answered():
+    while live.is_answering():
+        live.answer(0.0)
+
+
+def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_again(crate):
+    scene = bpy.context.scene
+    floor, slab = scene.softground.ground, in_live_mode_over_a_slab(crate)
+    before = shown_on(floor, crate, slab)
+    scene.softground.active_ground = 0
+    bpy.ops.softground.remove_ground()
+    all_answered()
+    assert "'Crate' is not among the grounds any more" in live.refusal()
+    scene.frame_set(83)
+    assert live.is_on()
+    also(crate)
+    scene.frame_set(84)
+    bpy.context.view_layer.update()
+    all_answered()
+    assert live.refusal() == ""
+    for now, then in zip(shown_on(floor, crate, slab), before, strict=True):
+        assert now == pytest.approx(then, abs=1e-6)
+    bpy.ops.softground.live(keep=True)
+    assert [record_of(each).about["inputs"]["ground"] for each in (floor, crate, slab)] == ["Field", CRATE, "Slab"]
+    assert len(below(prints_on(crate))) == len(prints_on(crate)) >= 2
+
+
+def test_live_mode_goes_on_when_another_of_its_grounds_is_shown_and_says_why_not_where_one_is_replaced(crate):
+    options = bpy.context.scene.softground
+    floor, slab = options.ground, in_live_mode_over_a_slab(crate)
+    before = shown_on(floor, crate, slab)
+    bpy.ops.softground.choose_ground(object=CRATE)
+    all_answered()
+    for now, then in zip(shown_on(floor, crate, slab), before, strict=True):
+        assert now == pytest.approx(then, abs=1e-6)
+    options.material.youngs_modulus /= 2
+    assert live.is_answering()
+    all_answered()
+    assert live.refusal() == ""
+    assert (before[1] - shown_on(crate)[0]).max() > 0.005
+    options.ground = slab
+    all_answered()
+    assert "'Crate' is not among the grounds any more" in live.refusal()
+    live.discard()
+    assert not any(map(baked_ground.has_remains, (floor, crate, slab)))
+
+
+@pytest.mark.parametrize("name", ["Field", CRATE])
+def test_live_mode_changes_none_of_its_grounds_while_one_is_in_edit_mode(crate, name):
+    floor = bpy.context.scene.softground.ground
+    also(crate)
+    bpy.context.scene.frame_set(60)
+    bpy.ops.softground.live()
+    before = fingerprints.of_file()
+    bpy.context.view_layer.objects.active = baked_ground.display_mesh_of(bpy.data.objects[name])
+    for keep in (True, False):
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert "is in Edit Mode: leave it with Tab first" in refusal(partial(bpy.ops.softground.live, keep=keep))
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert fingerprints.differences(before, fingerprints.of_file()) == []
+    assert live.is_on()
+    bpy.ops.softground.live()
+    assert not any(map(baked_ground.has_remains, (floor, crate)))
+    assert len(bpy.context.scene.softground.printed) == 0
+
+
+def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clears(crate, tmp_path):
+    options = bpy.context.scene.softground
+    also(crate)
+    bpy.context.scene.frame_set(60)
+    bpy.ops.softground.live()
+    assert [item.object for item in options.printed] == [options.ground, crate]
+    options.printed.clear()
+    bpy.ops.softground.remove_ground()
+    assert bake_report.unlisted(options) == [crate]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.clear_unlisted() == {"FINISHED"}
+    assert not any(map(baked_ground.has_remains, bpy.data.objects))
+
+
 def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
     scene = bpy.context.scene
     slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
@@ -448,8 +542,22 @@ def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_tha
     bpy.data.objects.remove(baked_ground.display_mesh_of(crate))
     scene.frame_set(61)
     assert not live.is_on()
+    assert live.refusal().startswith("Live mode has ended: a ground or its prints are gone")
     bpy.ops.softground.clear_bake()
     assert not baked_ground.has_remains(scene.softground.ground)
+
+
+def test_live_mode_waits_until_no_ground_has_a_bake(crate):
+    scene = bpy.context.scene
+    also(crate)
+    bake(scene)
+    bpy.ops.softground.clear_bake(only_shown=True)
+    assert not bpy.ops.softground.live.poll()
+    with pytest.raises(InputError, match="There is a bake on 'Crate'"):
+        jobs.run(live_start.starting(scene))
+    assert prints_on(crate)
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.live.poll()
 
 
 def test_what_moves_or_is_no_ground_is_refused(crate):

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import handlers, reuse, session
+from softground_addon.blender import handlers, reuse, session, settings
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.debris import debris_object
 from softground_addon.blender.ground import baked_ground, created_ground, ground_mesh
@@ -277,7 +277,7 @@ def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_s
 
 
 def test_a_redraw_looks_at_the_settings_for_a_refusal_only_after_one(live_shot, monkeypatch):
-    monkeypatch.setattr(live.settings, "snapshot", MagicMock(side_effect=AssertionError))
+    monkeypatch.setattr(settings, "snapshot", MagicMock(side_effect=AssertionError))
     assert live.refusal() == ""
 
 
