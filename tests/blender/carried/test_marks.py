@@ -287,6 +287,25 @@ def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
     assert mine.name == "Mine"
 
 
+@pytest.mark.parametrize("link", ["DATA", "OBJECT"])
+def test_attributes_in_the_viewport_are_switched_on_once_for_another_material_wherever_its_slot_is_linked(scene, link):
+    ground = scene.softground.ground
+    mine, slot = bpy.data.materials.new("Mine"), marks_object.of(ground).material_slots[0]
+    slot.link = link
+    slot.material = mine
+    bake(scene)
+    obj = marks_object.of(ground)
+    assert read_input(obj, "Attributes in Viewport")
+    set_input(obj, "Attributes in Viewport", False)
+    bake(scene)
+    obj = marks_object.of(ground)
+    assert not read_input(obj, "Attributes in Viewport"), "it is the user's choice"
+    assert (obj.material_slots[0].link, obj.material_slots[0].material) == (link, mine)
+    obj.modifiers.clear()
+    bake(scene)
+    assert read_input(marks_object.of(ground), "Attributes in Viewport"), "the choice went with the modifier"
+
+
 def test_marks_of_an_earlier_bake_play_by_the_present_laws_after_another(scene):
     obj = marks_object.of(scene.softground.ground)
     set_input(obj, "Drying", 3.0)
