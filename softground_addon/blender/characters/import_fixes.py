@@ -33,7 +33,7 @@ def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
 def sizes_at_rest(
     unit_scale: float, armature: bpy.types.Object, joints: Mapping[str, BoneEnd], *, soles: int, has_skin: bool
 ) -> tuple[float, float]:
-    """The same of an armature with some joints and so many soles."""
+    """The same of an armature with some joints and so many soles, on whose number its size does not depend."""
     if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
         return 0.0, 0.0
     bones = armature.data.bones
@@ -42,10 +42,11 @@ def sizes_at_rest(
     sizes = stature(heads.astype(float), world), extent(heads.astype(float), world)
     names = [f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle")]
     legs = [joints.get(name, ("", "")) for name in names]
-    if has_two_legs(joints, soles) and all(bone in bones for bone, _ in legs):
+    if all(bone in bones for bone, _ in legs):
         ends = np.array([getattr(bones[bone], f"{end}_local") for bone, end in legs]).reshape(2, 3, 3)
         lengths = np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1)
-        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), has_skin=has_skin)
+        captured = has_two_legs(joints, soles) and not has_skin
+        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), captured=captured)
     return sizes[0] * unit_scale, sizes[1] * unit_scale
 
 
