@@ -167,9 +167,10 @@ def bake(
     place = settings.find(wanted.ground) if wanted.ground else None
     for table in ("steps", "events"):
         result[table] = events_in_world(result[table], wanted.frame, place, wanted.unit_scale_m)
+    summary = bake_report.summary(result)
     for each, made_with, moved in zip(published, asked.of_each_ground, movers, strict=False):
         if each:
-            sign(each, made_with, moved, summary=bake_report.summary(result), warnings=result["warnings"])
+            sign(each, made_with, moved, summary=summary, warnings=result["warnings"])
     if published:
         bake_report.note_prints(scene.softground)
     yield Progress("write", 1.0)

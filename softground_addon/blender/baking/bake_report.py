@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -32,6 +33,9 @@ TYPICAL = "typical_depth_m"
 LAST_FRAME = "last_frame"
 """Entry of a bake's summary: the frame at which its last contact ends."""
 
+BAKED_AT = "baked_at"
+"""Entry of a bake's summary: when it was made [s], the same on all its grounds."""
+
 
 def baked_grounds(options: Any) -> list[bpy.types.Object]:
     """Grounds of a scene with a bake, without those whose steps a later bake has; the first, where none has any."""
@@ -47,20 +51,26 @@ def baked_grounds(options: Any) -> list[bpy.types.Object]:
 
 @dataclass(frozen=True)
 class _BakedShot:
-    """What a bake on a ground was of: that ground and all of the shot by name, its characters, its frames."""
+    """What a bake on a ground was of: that ground and all of the shot by name, its characters, its frames; and when."""
 
     ground: str = ""
     grounds: frozenset[str] = frozenset()
     characters: frozenset[str] = frozenset()
     frames: tuple[int, int] = (0, 0)
+    baked_at: float = 0.0
 
     def is_before(self, other: _BakedShot, *, is_listed_first: bool) -> bool:
         """True if another bake has the steps of this one, and is later, or listed first where nothing tells.
 
-        Each bake writes all grounds of its shot: what it was about and has not written was written since.
+        Each bake writes all grounds of its shot: what it was about and has not written was written since. That tells
+        of bakes of earlier versions, which do not know when they were made.
         """
         (start, end), (first, last) = self.frames, other.frames
-        if self.grounds == other.grounds or not self.characters & other.characters or last < start or end < first:
+        if not self.characters & other.characters or last < start or end < first:
+            return False
+        if self.baked_at != other.baked_at:
+            return self.baked_at < other.baked_at
+        if self.grounds == other.grounds:
             return False
         knows, is_known = other.ground in self.grounds, self.ground in other.grounds
         return knows if knows != is_known else is_listed_first
@@ -72,7 +82,8 @@ def _shot_on(ground: bpy.types.Object) -> _BakedShot:
         inputs = load_edits(bytes(baked_ground.stored_record(ground)))[0]["inputs"]
         grounds = [str(each["ground"]) for each in (inputs, *inputs.get("grounds", ()))]
         characters = frozenset(str(character["name"]) for character in inputs["characters"])
-        return _BakedShot(grounds[0], frozenset(grounds), characters, baked_ground.frames_of(inputs))
+        baked_at = ground_mesh.summary_of(baked_ground.display_mesh_of(ground)).get(BAKED_AT, 0.0)
+        return _BakedShot(grounds[0], frozenset(grounds), characters, baked_ground.frames_of(inputs), baked_at)
     return _BakedShot()
 
 
@@ -175,12 +186,13 @@ def shapes_left_out(objects: settings.Objects, wanted: BakeSettings) -> list[Fin
 
 
 def summary(result: dict[str, Any]) -> dict[str, float]:
-    """Summary of a bake for the panel."""
+    """Summary of a bake that was just made, for the panel."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
     shown = {key: totals[key] for key in ground_mesh.SHOWN}
     last = max((step["frame_end"] for step in result["steps"]), default=0.0)
-    return shown | {"seconds": seconds, FLOATING: floating_mm(result["gaps_mm"]), LAST_FRAME: last}
+    floating = floating_mm(result["gaps_mm"])
+    return shown | {"seconds": seconds, FLOATING: floating, LAST_FRAME: last, BAKED_AT: time.time()}
 
 
 def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:

@@ -55,8 +55,8 @@ SLIDERS = (
 IN_VIEW = GroupInput(
     "Attributes in Viewport",
     False,
-    "Delete marks to come and work out attributes in the viewport too, as for renders and files: slower, for materials"
-    " that read wetness",
+    "Delete marks to come and work out attributes in the viewport too, as for renders, Alembic and USD: slower, for "
+    "materials that read wetness, and for Apply and exporters that take what the viewport shows, as OBJ",
     kind="Bool",
 )
 INPUTS = (*SLIDERS, IN_VIEW)

@@ -33,6 +33,8 @@ BELONGS = Belonging(nodes.MARK, "softground_marked", "softground_marked_by")
 of = BELONGS.of
 ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 """Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
+LOOKS_OTHER = "softground_marks_look"
+"""Of the object: true where a material was not ours, which may read what the viewport does not work out."""
 SELECTED = {".select_vert", ".select_edge", ".select_poly"}
 """What new elements of a mesh are, which takes a thirtieth of it in a file."""
 FLOORS, THICKNESS = "softground_floors", "softground_thickness"
@@ -61,9 +63,11 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     BELONGS.give(ground, obj)
     if units.frame:
         hang_on(obj, ground, units.frame)
+    is_known = modifier is not None and obj.get(LOOKS_OTHER, False)
+    obj[LOOKS_OTHER] = not all(map(reads_clock, _looks(obj)))  # another's, or of an earlier version
     modifier = modifier or obj.modifiers.new(NAME, "NODES")
     _play(modifier, group)
-    if not all(slot is None or reads_clock(slot) for slot in mesh.materials):  # another's, or of an earlier version
+    if obj[LOOKS_OTHER] and not is_known:  # from then on it is the user's choice
         set_inputs(modifier, {nodes.IN_VIEW.name: True})
     _remove_unused()
     return obj
@@ -161,8 +165,13 @@ def _remove_unused() -> None:
 
 def _is_ours_of_another(obj: bpy.types.Object, surface: str) -> bool:
     """True if its materials are ours, and none for this surface."""
-    looks = [slot.get(nodes.MARK) for slot in obj.data.materials if slot is not None]
+    looks = [look.get(nodes.MARK) for look in _looks(obj)]
     return all(looks) and surface not in looks
+
+
+def _looks(obj: bpy.types.Object) -> list[bpy.types.Material]:
+    """Materials that an object shows, whether they are its own or of its mesh."""
+    return [slot.material for slot in obj.material_slots if slot.material]
 
 
 def _modifier_of(obj: bpy.types.Object) -> Any:

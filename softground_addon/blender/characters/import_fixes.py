@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import bpy
@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.motion.people import has_two_legs, likely_mass, sizes_by_legs
 from ...core.rig.bones import extent, stature
 from ...core.rig.mapping import BoneEnd
-from ..compat import action_curves
+from ..compat import HAS_SLOTS, action_curves, slot_of
 from ..rigs.frame_ranges import ancestors
 from ..sampling.skin_sampling import meshes_on
 from ..settings import frame_rate_of, time_stretch_of
@@ -33,7 +33,7 @@ def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
 def sizes_at_rest(
     unit_scale: float, armature: bpy.types.Object, joints: Mapping[str, BoneEnd], *, soles: int, has_skin: bool
 ) -> tuple[float, float]:
-    """The same of an armature with some joints and so many soles."""
+    """The same of an armature with some joints and so many soles, on whose number its size does not depend."""
     if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
         return 0.0, 0.0
     bones = armature.data.bones
@@ -42,10 +42,11 @@ def sizes_at_rest(
     sizes = stature(heads.astype(float), world), extent(heads.astype(float), world)
     names = [f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle")]
     legs = [joints.get(name, ("", "")) for name in names]
-    if has_two_legs(joints, soles) and all(bone in bones for bone, _ in legs):
+    if all(bone in bones for bone, _ in legs):
         ends = np.array([getattr(bones[bone], f"{end}_local") for bone, end in legs]).reshape(2, 3, 3)
         lengths = np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1)
-        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), has_skin=has_skin)
+        captured = has_two_legs(joints, soles) and not has_skin
+        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), captured=captured)
     return sizes[0] * unit_scale, sizes[1] * unit_scale
 
 
@@ -68,17 +69,23 @@ PUT_UNDER = "softground_empty"
 """Custom property of an empty above a character: what it is for."""
 
 
-def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, purpose: str) -> bpy.types.Object:
+def put_under(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    purpose: str,
+    is_fit: Callable[[bpy.types.Object], object] = bool,
+) -> bpy.types.Object:
     """Hang a character, with the meshes that it deforms, on an empty at the origin; whatever animates it stays.
 
-    It is the one that was made for this purpose before, wherever the user has put that since, or else a new one.
+    It is the one that was made for this purpose before, wherever the user has put that since, if it is still fit for
+    it, or else a new one above all.
 
     Raises
     ------
     InputError
         If it is linked from another file.
     """
-    before = next((obj for obj in ancestors(armature) if obj.get(PUT_UNDER) == purpose), None)
+    before = next((obj for obj in ancestors(armature) if obj.get(PUT_UNDER) == purpose and is_fit(obj)), None)
     tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene.objects, armature)))
     linked = next((obj for obj in ([before] if before else tops) if obj.library), None)
     if linked is not None:
@@ -107,7 +114,7 @@ def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDA
     InputError
         If it is linked from another file.
     """
-    empty, options, stretch = put_under(scene, armature, "Travel"), scene.softground, time_stretch_of(scene)
+    empty, options, stretch = put_under(scene, armature, "Travel", _travels), scene.softground, time_stretch_of(scene)
     if not _travels(empty):
         for frame in (options.frame_start, options.frame_end):
             empty.keyframe_insert("location", frame=frame * stretch)
@@ -127,9 +134,13 @@ def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDA
 
 
 def _travels(empty: bpy.types.Object) -> list[bpy.types.FCurve]:
-    """Curves of the place of an empty."""
+    """Curves of the place of an empty; none where they do not move it level, or are not its own alone."""
     animation = empty.animation_data
-    if not (animation and animation.action):
+    action = animation.action if animation else None
+    if not action or action.library or action.users - action.use_fake_user > 1 or animation.nla_tracks:
         return []
-    curves = action_curves(animation.action, getattr(animation, "action_slot", None))
-    return [curve for curve in curves if curve.data_path == "location"]
+    slot = slot_of(animation)
+    curves = [] if HAS_SLOTS and slot is None else action_curves(action, slot)
+    moving = [curve for curve in curves if curve.data_path == "location" and not curve.mute]
+    moving = [curve for curve in moving if len(curve.keyframe_points) > 1]
+    return moving if {0, 1} <= {curve.array_index for curve in moving} else []

@@ -283,12 +283,13 @@ class LiveMode:
                 writing.append(None)
         for waiting in filter(None, writing):
             yield from until_ready(waiting[0])
+        baked_at = {bake_report.BAKED_AT: time.time()}
         for part, job, each, moved in zip(self._parts, writing, of_each, movers, strict=True):
             if job is None:  # no step is on it by now
                 part.discard()
                 continue
             published = (yield from job[0]) if len(writing) == 1 else jobs.run(job[0])
-            sign(published, each, moved, summary=bake_report.summary_of_prints(job[1]))
+            sign(published, each, moved, summary=bake_report.summary_of_prints(job[1]) | baked_at)
         bake_report.note_prints(scene.softground)
 
     def _kept_with(self, asked: BakeSettings) -> BakeSettings:

@@ -101,6 +101,7 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         options, wades = scene.softground, self.preset == "WADING"
+        _unset_unnoted(options)
         for part in settings.PERFORMANCE:
             setattr(options.grounding, part, 0.0)
         options.grounding.arms, options.tilt.use = WADING_ARMS * wades, wades
@@ -114,6 +115,14 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
         elif (scene.render.frame_map_old, scene.render.frame_map_new) == tuple(options.slowed_time):
             settings.slow_down(scene, 1.0)
         return {"FINISHED"}
+
+
+def _unset_unnoted(options: Any) -> None:
+    """Unset the strength of Tilt where Wading of an earlier version has set it, which did not note the user's own."""
+    tilt = options.tilt
+    wades = tilt.use and isclose(tilt.strength, WADING_TILT, rel_tol=1e-6) and options.grounding.arms == WADING_ARMS
+    if wades and tilt.own_strength < 0.0:
+        tilt.property_unset("strength")
 
 
 def _lend(tilt: Any, strength: float) -> None:

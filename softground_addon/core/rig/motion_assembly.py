@@ -124,7 +124,7 @@ def assemble_motion(
     four_legged = rest.is_four_legged(mapping)
     sizes_at_rest = stature(heads, recording.armature[0]), extent(heads, recording.armature[0])
     if has_two_legs(mapping.joints, len(mapping.soles)) and not four_legged:
-        sizes_at_rest = sizes_by_legs(*sizes_at_rest, leg, has_skin=skin is not None)
+        sizes_at_rest = sizes_by_legs(*sizes_at_rest, leg, captured=skin is None)
     return CharacterMotion(
         name=name,
         mass=mass,

@@ -71,7 +71,7 @@ def there(mesh):
 
 
 def in_files(obj):
-    """Have marks play in the viewport as they do in renders and files."""
+    """Have marks play in the viewport as they do in renders, Alembic and USD."""
     set_input(obj, "Attributes in Viewport", True)
     return obj
 
@@ -285,6 +285,45 @@ def test_clear_takes_all_of_them_away_and_another_bake_renews_them(scene):
     bpy.ops.softground.clear_bake()
     assert not [name for _, name in blocks() if "Marks" in name]
     assert mine.name == "Mine"
+
+
+def test_what_the_viewport_shows_goes_without_marks_to_come_into_obj_files_and_apply_once_it_is_asked_for(
+    scene, tmp_path
+):
+    obj, vertices = marks_object.of(scene.softground.ground), {}
+    frame = int(np.median(values(obj.data, "birth")))
+    for asked in (False, True):
+        set_input(obj, "Attributes in Viewport", asked)
+        scene.frame_set(frame)
+        for other in scene.objects:
+            other.select_set(other == obj)
+        path = tmp_path / "marks.obj"
+        bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True)
+        vertices[asked] = sum(line.startswith("v ") for line in path.read_text().splitlines())
+    to_come = values(obj.data, "birth") > frame
+    assert 0 < to_come.sum() == vertices[False] - vertices[True]
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.modifier_apply(modifier=obj.modifiers[0].name)
+    assert len(obj.data.vertices) == vertices[True]
+
+
+@pytest.mark.parametrize("link", ["DATA", "OBJECT"])
+def test_attributes_in_the_viewport_are_switched_on_once_for_another_material_wherever_its_slot_is_linked(scene, link):
+    ground = scene.softground.ground
+    mine, slot = bpy.data.materials.new("Mine"), marks_object.of(ground).material_slots[0]
+    slot.link = link
+    slot.material = mine
+    bake(scene)
+    obj = marks_object.of(ground)
+    assert read_input(obj, "Attributes in Viewport")
+    set_input(obj, "Attributes in Viewport", False)
+    bake(scene)
+    obj = marks_object.of(ground)
+    assert not read_input(obj, "Attributes in Viewport"), "it is the user's choice"
+    assert (obj.material_slots[0].link, obj.material_slots[0].material) == (link, mine)
+    obj.modifiers.clear()
+    bake(scene)
+    assert read_input(marks_object.of(ground), "Attributes in Viewport"), "the choice went with the modifier"
 
 
 def test_marks_of_an_earlier_bake_play_by_the_present_laws_after_another(scene):

@@ -7,7 +7,7 @@ import pytest
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 from softground_addon.blender.characters.import_fixes import sizes_of
-from softground_addon.blender.compat import action_curves
+from softground_addon.blender.compat import HAS_SLOTS, action_curves, channels_of, slot_of
 from softground_addon.blender.reading import analysis
 from softground_addon.core.motion.units import scale_to_metres
 from tests.blender import shots
@@ -118,6 +118,63 @@ def test_walk_ahead_a_second_time_acts_on_the_empty_of_the_first(scene, turned):
     bpy.context.view_layer.update()
     assert "Walker" not in analysis.read(scene).belts
     assert speed_of(scene, armature) == pytest.approx(Gait().speed, rel=0.03)
+
+
+def push_down(animation):
+    action, slot = animation.action, slot_of(animation)
+    strip = animation.nla_tracks.new().strips.new("Travel", 1, action)
+    if HAS_SLOTS:
+        strip.action_slot = slot
+    animation.action = None
+
+
+def leave_one_key(animation):
+    for curve in channels_of(animation.action, slot_of(animation)):
+        curve.keyframe_points.remove(curve.keyframe_points[1])
+
+
+def delete_ways(animation):
+    curves = channels_of(animation.action, slot_of(animation))
+    for curve in [curve for curve in curves if curve.array_index < 2]:
+        curves.remove(curve)
+
+
+def mute(animation):
+    for curve in action_curves(animation.action):
+        curve.mute = True
+
+
+def share(animation):
+    """Let another object be animated by the same action, by its own slot if there are any."""
+    other = bpy.data.objects.new("Other", None).animation_data_create()
+    other.action = animation.action
+    if HAS_SLOTS:
+        other.action_slot = other.action.slots.new(id_type="OBJECT", name="Other")
+        other.id_data.keyframe_insert("location", frame=1)
+        animation.action_slot = None
+
+
+@pytest.mark.parametrize("spoil", [push_down, leave_one_key, delete_ways, mute, share])
+def test_walk_ahead_takes_a_new_empty_where_the_curves_of_the_first_do_not_move_it_or_move_others(scene, spoil):
+    armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
+    bpy.ops.softground.walk_ahead()
+    first = armature.parent
+    action = first.animation_data.action
+    for curve in action_curves(action):
+        for key in curve.keyframe_points:
+            key.co.y *= 0.0
+        curve.update()
+        curve.id_data.update_tag()
+    spoil(first.animation_data)
+    keys = [tuple(key.co) for curve in action_curves(action) for key in curve.keyframe_points]
+    bpy.context.view_layer.update()
+    bpy.ops.softground.walk_ahead()
+    assert first.parent.name == "Walker Travel.001"
+    assert keys == [tuple(key.co) for curve in action_curves(action) for key in curve.keyframe_points]
+    bpy.context.view_layer.update()
+    assert speed_of(scene, armature) == pytest.approx(Gait().speed, rel=0.03)
+    with pytest.raises(RuntimeError, match="'Walker' does not walk on the spot"):
+        bpy.ops.softground.walk_ahead()
 
 
 @pytest.mark.slow

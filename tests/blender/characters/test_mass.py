@@ -4,7 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.characters.contact_editing import add_bone_contacts, add_object_contacts
 from softground_addon.blender.operators.character_editing import suggested_mass
+from softground_addon.blender.reading import analysis
 from tests.blender import shots
 from tests.blender.baking.test_self_check import codes
 from tests.blender.characters.test_recognition import box
@@ -141,3 +143,17 @@ def test_a_large_head_on_two_legs_weighs_what_a_person_does_and_its_volume_is_qu
     assert character.mass == pytest.approx(PERSON, rel=0.1)
     assert not suggested_mass(character)
     assert "mass_of_size" not in codes(bake(scene).report)
+
+
+@pytest.mark.parametrize("what", ["hand", "cane"])
+def test_what_prints_beside_the_feet_leaves_the_skin_as_heavy_as_it_is(scene, what):
+    shots.walker(scene, frames=30)
+    character = added(scene)
+    if what == "hand":
+        add_bone_contacts(character, ["hand.L"])
+    else:
+        cane = mesh_on(character.armature, "Cane", *cylinder(0.02, -0.9, 0.1), "hand.L", hung=True)
+        add_object_contacts(scene.softground, character, [cane])
+    bpy.context.view_layer.update()
+    (motion,) = analysis.read(scene).shot.motions
+    assert motion.skin.mass == pytest.approx(character.skin_mass, rel=1e-3)

@@ -901,6 +901,31 @@ def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_n
     assert bake_report.baked_grounds(options) == [crate, floor]
 
 
+@pytest.mark.parametrize("again", ["bake", "live"])
+def test_the_later_bake_is_heard_whatever_grounds_are_called_by_then_and_whichever_is_listed_first(crate, again):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    also(crate)
+    bake(scene)
+    further_grounds.choose(options, options.grounds[0])
+    options.grounds.clear()
+    floor.name, crate.name, options.cell_size = "Floor", "Box", 0.021
+    if again == "live":
+        bpy.ops.softground.clear_bake()
+        scene.frame_set(1)
+        bpy.ops.softground.live()
+        scene.frame_set(84)
+        bpy.ops.softground.live(keep=True)
+    else:
+        bake(scene)
+    step = baked_ground.steps_of(crate)[0]
+    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step.name: StepEdit(strength=0.5)}))
+    also(floor)
+    assert bake_report.baked_grounds(options) == [crate]
+    further_grounds.choose(options, options.grounds[0])
+    assert bake_report.baked_grounds(options) == [crate]
+
+
 def test_bakes_of_other_times_of_the_shot_are_all_heard(crate):
     scene = bpy.context.scene
     options, floor = scene.softground, scene.softground.ground
