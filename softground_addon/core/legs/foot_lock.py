@@ -170,8 +170,11 @@ def _pivot(sole: Underside, during: slice, bearing: Array, turning: Array) -> Ar
     near = np.exp(-np.abs(sole.along - np.linspace(0.0, 1.0, PLACES)[:, None]) / STRIP)
     places = np.einsum("pq,kqi->kpi", near / near.sum(axis=1, keepdims=True), sole.points[during])
     calmest = int((turning @ np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1)).argmin())
-    height = near[calmest] @ sole.heights[during].T / near[calmest].sum() - sole.lowest()[during]
-    rests = np.clip(2.0 - height / (OFF_FLOOR * sole.length), 0.0, 1.0)[1:, None]
+    heights = sole.heights[during]
+    over = np.isfinite(heights)  # what is beyond the floor has no height above it
+    share = near[calmest] * over
+    height = np.einsum("kq,kq->k", share, np.where(over, heights, 0.0)) / np.maximum(share.sum(axis=1), 1e-300)
+    rests = np.clip(2.0 - (height - sole.lowest()[during]) / (OFF_FLOOR * sole.length), 0.0, 1.0)[1:, None]
     return np.asarray(bearing + rests * (places[1:, calmest, :2] - bearing))
 
 

@@ -30,6 +30,8 @@ SAME = 0.12
 skin with fewer faces."""
 THROUGH = 0.02
 """Share of the extent of a closed piece by which a body goes on at both ends of one that it wears."""
+THINNEST = 0.1
+"""Share of the volume of a closed piece from which what goes on at both its ends wears it: less is a rod through it."""
 MOST_CURVES = 200
 """Curves of one slice that are looked at, the largest first."""
 AS_CLOSED = 0.02
@@ -164,6 +166,7 @@ def _volume_along(points: Array, triangles: Indices, known: Pieces) -> tuple[flo
     ends = np.full((2, known.number.max() + 1), [[np.inf], [-np.inf]])
     np.minimum.at(ends[0], known.number, height.min(axis=1))
     np.maximum.at(ends[1], known.number, height.max(axis=1))
+    ends = np.append(ends, [np.bincount(known.number[of_curve], area, ends.shape[1])], axis=0)
     ends, cloth = ends[:, known.number[of_curve]], known.is_cloth[of_curve]
     slices = _by_slice(cut.slice[order[first]], area)
     total = sum(_united(support[at], area[at], around[at], cloth[at], ends[:, at]) for at in slices)
@@ -224,13 +227,14 @@ def _by_slice(number: Indices, area: Array) -> list[Indices]:
 def _united(support: Array, area: Array, around: Array, cloth: Mask, ends: Array) -> float:
     """Area of curves, the largest first, without those within a larger one and without cloth around skin.
 
-    Cloth is also a closed piece, such as a skirt, through which another goes on at both `ends` (2, C).
+    Cloth is also a closed piece, such as a skirt, through which another goes on at both ends that is no thin rod.
+    `ends` (3, C) are the lowest and the highest height of the piece of each curve, and the area that it has in all.
     """
     sticks_out = np.maximum(support[None] - support[:, None], 0.0)
     within = sticks_out.max(axis=2) <= WITHIN * around[:, None] / (2 * np.pi)
     within = np.triu(within | (sticks_out.mean(axis=2) <= SAME * around / (2 * np.pi)), 1)
-    low, high = ends
+    low, high, holds = ends
     reach = THROUGH * (high - low)[:, None]
-    through = (low < low[:, None] - reach) & (high > high[:, None] + reach)
+    through = (low < low[:, None] - reach) & (high > high[:, None] + reach) & (holds > THINNEST * holds[:, None])
     visible = ~(within & (cloth[:, None] | through) & ~cloth).any(axis=1)
     return float(area[visible & ~(within & visible[:, None]).any(axis=0)].sum())

@@ -86,6 +86,17 @@ def test_a_foot_that_turns_on_its_heel_or_toes_and_skates_stays_where_these_firs
     assert farthest(locked(rim, TOUCHING).points) < 0.01
 
 
+@pytest.mark.parametrize("beyond", [1, 9, 60])
+def test_a_foot_that_turns_as_it_stands_stays_though_a_part_of_it_is_beyond_the_floor(beyond):
+    angles, pivot = np.radians(110.0) * PART, 0.3 * LENGTH
+    rim = sole((level(angles), pivot * np.stack([1 - np.cos(angles), -np.sin(angles), 0 * PART], axis=-1)))
+    heights = rim.heights.copy()
+    heights[:, np.argsort(rim.along, kind="stable")[-beyond:]] = np.inf
+    near = np.abs(rim.along - 0.3) < 0.06
+    middle = locked(replace(rim, heights=heights), TOUCHING).points[:, near, :2].mean(axis=1)
+    assert np.linalg.norm(middle - middle[0], axis=1).max() < 0.003
+
+
 def rounded(turn, radius=0.08):
     """The rim of a sole with a rounded toe, turned (F, 3, 3) about where the round begins, on level floor."""
     angle = np.linspace(0.0, 0.5 * np.pi, 40)

@@ -169,6 +169,14 @@ def test_a_closed_skirt_around_a_body_that_goes_on_at_both_ends_is_no_body():
     assert body_volume(*turned(united(leg, skirt), upright)) == pytest.approx(np.pi * (0.25 + 0.005), rel=0.05)
 
 
+@pytest.mark.parametrize("turn", [*TURNS, (np.pi / 2, 0.0, 0.0)])
+@pytest.mark.parametrize("radius", [0.02, 0.05, 0.1])
+def test_a_body_with_a_thin_rod_through_it_is_no_skirt(radius, turn):
+    body, rod = wheel(0.4, 1.0), wheel(radius, 1.3)
+    volume = np.pi * (0.4**2 + 0.3 * radius**2)
+    assert body_volume(*turned(united(body, rod), turn)) == pytest.approx(volume, rel=0.03)
+
+
 def test_components_are_those_of_a_random_graph():
     random = np.random.default_rng(0)
     first, other = random.integers(0, 300, (2, 220))
