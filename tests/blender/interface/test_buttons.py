@@ -153,11 +153,14 @@ def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatc
 
 def test_weather_comes_in_short_steps_and_not_at_all_where_they_are_left(scene, press, steps):
     before = fingerprints.of_file()
-    for ticks in (1, 5, 20, 30):
+    for ticks in itertools.count(1, 3):
         job = weather.adding(scene.softground.ground)
-        list(itertools.islice(job, ticks))
+        if len(list(itertools.islice(job, ticks))) < ticks:
+            break
         job.close()
         assert fingerprints.of_file() == before
+    assert ticks > 3
+    bpy.ops.softground.remove_weather()
     for preset in ("SNOWFALL", "THAW"):
         result, ticks = press("add_weather", preset=preset)
         assert (result, ticks > 0) == ({"FINISHED"}, True)
