@@ -131,7 +131,7 @@ def _sole_hashes(
 def _made_with(now: BakeSettings, record: BakeRecord) -> BakeSettings:
     """The settings of now, with those that the prints were pressed and put on the ground with."""
     try:
-        inputs = {"under": "AUTO", **record.about["inputs"]}
+        inputs = {"under": "AUTO", "grounds": (), **record.about["inputs"]}
         writing = {"under": "AUTO", **now.between(Acts.WRITING, Acts.WRITING)}
         on_ground = {name: type(value)(inputs[name]) for name, value in writing.items()}
         surfaces.find(inputs["surface"])

@@ -275,6 +275,16 @@ def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(
     assert not record_of(floor).edits
 
 
+def test_steps_are_edited_as_well_once_another_ground_was_listed(crate):
+    scene = bpy.context.scene
+    bake(scene)
+    also(crate)
+    step = baked_ground.steps_of(scene.softground.ground)[0].name
+    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step: StepEdit(strength=0.5)}))
+    assert record_of(scene.softground.ground).edits == {step: StepEdit(strength=0.5)}
+    assert not baked_ground.is_baked(crate)
+
+
 def test_what_makes_one_ground_outdated_is_said_of_each(crate):
     scene = bpy.context.scene
     item = also(crate)
