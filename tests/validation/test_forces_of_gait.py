@@ -13,6 +13,7 @@ import pytest
 
 from library.softground.scoring import Score, plates_saw_everything, score
 from library.softground.trials import Trial, motion_of_trial, read_trial
+from softground_addon.core.dynamics.continuation import without_holds
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
@@ -64,6 +65,17 @@ def test_errors_are_as_wide_as_their_standard_deviations_say():
     first, two = np.median(inside, axis=0)
     assert 0.6 < first < 0.9
     assert two > 0.9
+
+
+@pytest.mark.parametrize("rate", [None, 48.0, 120.0])
+def test_no_cut_of_a_measured_motion_is_taken_for_keys_that_ease(rate):
+    """As landings and push-offs might be, at the end of what is cut."""
+    for file in sorted(DATA.glob("*.csv")):
+        trial = read_trial(file)
+        motion = motion_of_trial(at_rate(trial, rate) if rate else trial)
+        for first in range(len(motion.frames) - 40):
+            part = motion.of(slice(first, first + 40))
+            assert without_holds(part) is part, (file.stem, first)
 
 
 def with_points(trial: Trial, change) -> Trial:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import orthonormal
 from ..numerics.arrays import Array, Mask
-from ..numerics.interpolation import cubic, in_stretches
+from ..numerics.interpolation import cubic, in_stretches, linear
 from ..numerics.intervals import runs
 
 SAME_POSE = 1e-5
@@ -24,14 +24,20 @@ LONGEST_HOLD = 0.25
 """A pose that stays longer is a rest and not a stepped key [s]: keys on threes at 12 frames a second."""
 EASE = 1 / 24
 """Time between keys [s]: those of most actions, which ease from the first key and into the last."""
-LONGEST_EASE = 0.15
-"""It is no longer than this, in sqrt(leg length/gravity): small bodies start in less."""
 WHOLE = 0.3
 """Part of a frame by which it may be longer than whole frames: at 30 a second, keys of 24 are seen in no second one."""
+LATE = 0.0, 0.25, 0.5, 0.75
+"""Part of a frame after which the first key may come: it is held until then."""
+HANDLE = 1 / 2.5614
+"""Length of an automatic handle, in times between keys."""
 STARTS = 0.01
 """A body that moves less in that time stands or stops, in leg lengths (0.2 m/s for an adult)."""
-EASES = 0.8
-"""Share of its speed over that time at which a body begins that eases: 1 for a steady one."""
+STEADY = 0.6
+"""Share of its speed between the next two keys that a body that eases has on average before: cut walks have about 1,
+what lands or starts with an even force less than 0.5."""
+NEARER = 0.3
+"""It eases if it is nearer by this to what lies between such keys than to what would go on as beyond them: cut walks
+come to 0.07 to 0.23, landings and push-offs between force plates to 0.8 and more."""
 LIKE_POSE = 0.05
 """Poses are alike when joints and soles are this near on average, in leg lengths (5 cm for an adult)."""
 VELOCITY_WEIGHT = 0.3
@@ -142,22 +148,36 @@ def _held(motion: CharacterMotion) -> Mask:
 
 
 def _eased(motion: CharacterMotion) -> Mask:
-    """Frames within `EASE` of an end at which the whole body starts or stops in that time.
+    """Frames within `EASE` of an end at which the whole body eases as between keys.
 
     The first and the last key of a cut take have flat handles: what walks on in the take seems to stand there, the more
-    so the more frames there are between keys.
+    so the more frames there are between keys. Bodies that start, land or stop in that time do not move like that.
     """
     paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
-    ease = min(EASE, LONGEST_EASE * motion.pendulum_time)
-    eased, count = np.zeros(len(motion.frames), dtype=bool), ceil(ease / motion.time_step - WHOLE)
-    if not 1 < count < len(eased) / 2:
+    eased, between = np.zeros(len(motion.frames), dtype=bool), EASE / motion.time_step
+    if not 1 < ceil(between - WHOLE) < len(eased) / 4:
         return eased
     for order in (slice(None), slice(None, None, -1)):
-        way = np.diff([path[order][[0, 1, count]] for path in paths], axis=1)
-        whole = way.sum(axis=1)
-        moves = np.linalg.norm(whole, axis=1).mean() > STARTS * motion.leg_length
-        eased[order][1:count] = moves and count * (way[:, 0] * whole).sum() < EASES * (whole**2).sum()
+        path = np.stack([path[order][: ceil(3 * between) + 2] for path in paths], axis=1)
+        ends = [ceil(late + between - WHOLE) for late in LATE if _eases(path, between, late, motion.leg_length)]
+        eased[order][1 : max(ends, default=1)] = True
     return eased
+
+
+def _eases(path: Array, between: float, late: float, leg_length: float) -> bool:
+    """True of joints (F, J, 3) that ease from a key `late` frames after the first to the next, `between` frames on."""
+    count = ceil(late + between - WHOLE)
+    place = np.clip((np.arange(1, count) - late) / between, 0.0, 1.0)
+    keys = np.concatenate([path[:1], linear(path, late + between * np.arange(1, 4))])
+    way, after = keys[1] - keys[0], keys[2] - keys[1]
+    if np.linalg.norm(way, axis=1).mean() <= STARTS * leg_length or (way * after).sum() < STEADY * (after**2).sum():
+        return False
+    part = np.linspace(0.0, 1.0, 101)
+    time = 3 * part * (1 - part) * (HANDLE * (1 - part) + (1 - HANDLE) * part) + part**3
+    part = np.interp(place, time, part)[:, None, None]
+    handle = keys[1] - HANDLE * (keys[2] - keys[0]) / 2
+    ease = keys[0] + 3 * part**2 * (1 - part) * (handle - keys[0]) + part**3 * way
+    return bool(np.linalg.norm(path[1:count] - ease) < NEARER * np.linalg.norm(path[1:count] - cubic(keys, place)))
 
 
 def _mapped(motion: CharacterMotion, change: Callable[[Array], Array]) -> CharacterMotion:

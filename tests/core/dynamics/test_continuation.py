@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.dynamics.continuation import continued, without_holds
+from softground_addon.core.dynamics.continuation import _eased, continued, without_holds
 from tests.core.character import character, flat_sole
 
 RATE = 24.0
@@ -43,6 +43,48 @@ def test_feet_bear_as_their_skin_does_where_they_all_stand_and_no_joint_tells_wh
     motion = character([sole], rate=RATE, hips=path + np.array((0, 0, 0.9)))
     smooth = without_holds(motion if known else replace(motion, joints={}))
     assert (smooth.soles[0].bears == bears).all() != known
+
+
+def curve(keys, handle=1 / 2.5614, steps=5):
+    """Keys (K, 3) with automatic handles, flat at both ends, at `steps` frames from one to the next."""
+    slope = np.concatenate([[0 * keys[0]], (keys[2:] - keys[:-2]) / 2, [0 * keys[0]]]) * handle
+    part = np.linspace(0.0, 1.0, 1001)
+    time = 3 * part * (1 - part) * (handle * (1 - part) + (1 - handle) * part) + part**3
+    s = np.interp(np.arange(steps) / steps, time, part)[:, None]
+    pieces = [
+        (1 - s) ** 2 * (1 + 2 * s) * a + s**2 * (3 - 2 * s) * b + 3 * s * (1 - s) * ((1 - s) * before - s * after)
+        for a, b, before, after in zip(keys, keys[1:], slope, slope[1:], strict=False)
+    ]
+    return np.concatenate([*pieces, keys[-1:]])
+
+
+def with_paths(motion, change, rate):
+    feet = [flat_sole(change(sole.transforms[:, 0, :3, 3])) for sole in motion.soles]
+    return character(feet, rate=rate, hips=change(motion.joints["hips"]))
+
+
+@pytest.mark.parametrize("steps", [2, 5])
+def test_a_take_that_eases_from_its_first_key_and_into_its_last_goes_on_there(steps):
+    walk = walker(49)
+    take = with_paths(walk, lambda keys: curve(keys, steps=steps), RATE * steps)
+    speed = np.diff(without_holds(take).joints["hips"][:, 0]) * RATE * steps
+    assert np.diff(take.joints["hips"][:, 0])[[0, -1]].max() * RATE * steps < 0.8
+    assert speed == pytest.approx(np.ones(len(speed)), abs=0.03)
+
+
+@pytest.mark.parametrize("order", [slice(None), slice(None, None, -1)], ids=["lands", "pushes off"])
+@pytest.mark.parametrize("seconds", [0.06, 0.1, 0.2])
+def test_a_body_that_lands_or_pushes_off_at_the_end_of_a_take_does_not_ease(seconds, order):
+    """It falls, and its legs take up its speed evenly: its feet stand, its hips come to rest or nearly so."""
+    for rest in (0.0, 0.01, 0.03):
+        left = -rest - (np.arange(100) - 99) / 100  # until it has come to rest [s]
+        braked = 2.0 * np.clip(left, 0.0, seconds) ** 2 / (2 * seconds)
+        falls = 2.0 * np.clip(left - seconds, 0.0, None)
+        hips = np.stack([0 * left, 0 * left, 0.8 + braked + falls], axis=1)[order]
+        feet = [flat_sole(np.stack([0 * left, 0 * left + side, falls], axis=1)[order]) for side in (-0.1, 0.1)]
+        above = {name: np.add(hips, (0, 0, up)) for name, up in {"chest": 0.4, "head": 0.7}.items()}
+        motion = character(feet, rate=100.0, hips=hips, **above)
+        assert not _eased(motion).any(), rest
 
 
 def test_a_rest_is_no_hold():
