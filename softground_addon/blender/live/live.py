@@ -13,7 +13,8 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
-from .. import session
+from .. import session, settings
+from ..ground import baked_ground
 from ..remedies import said
 from ..state import state
 from ..translation import translated
@@ -61,7 +62,8 @@ def after_undo() -> None:
     """Handle an undo or redo: the mesh is replaced; live mode goes on if the new one is its own."""
     scene = _scene()
     if state.live is not None and (scene is None or not state.live.show_anew(scene)):
-        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
+        left = scene is not None and any(map(baked_ground.has_remains, settings.listed_grounds(scene.softground)))
+        forget(translated("a ground or its prints are gone: clear what is left, and start it again") if left else "")
 
 
 def answer(seconds: float | None = None) -> float | None:

@@ -123,7 +123,7 @@ class LiveGround:
             return None
         mesh = ground_mesh.mesh_of(ground)
         intact = ground_mesh.is_baked(ground) and len(mesh.vertices) == len(self._rest)
-        return ground if intact else None
+        return ground if intact and settings.exists(ground) else None
 
     def show(
         self, ground: bpy.types.Object, playhead: Playhead, windows: Sequence[Window], sigma: float, frame_rate: float

@@ -238,8 +238,9 @@ class CarvedCells:
         """
         standing = self.standing
         lower = ~self.closed & (standing < self.terrain - ROUNDING)
-        surface = np.where(lower, standing + self.loose, np.inf)
-        drops = [standing - lowest_within(surface, ceil(part * EDGE / self.cell_size)) for part in (1 / 3, 2 / 3, 1)]
+        depth, surface = self.terrain - standing, np.where(lower, standing + self.loose - self.terrain, np.inf)
+        reach = [ceil(part * EDGE / self.cell_size) for part in (1 / 3, 2 / 3, 1)]
+        drops = [-depth - lowest_within(surface, cells) for cells in reach]  # a hillside is no wall
         near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
         before = np.maximum(np.minimum(self.pressed, self.terrain) - standing, 0.0)
         broken = np.minimum(deepest * near - before, MOST_OF_DROP * drops[-1])

@@ -543,7 +543,8 @@ def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clea
     assert not any(map(baked_ground.has_remains, bpy.data.objects))
 
 
-def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate):
+@pytest.mark.parametrize("by", ["script", "key"])
+def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate, by):
     scene = bpy.context.scene
     slab = box(scene, "Slab", 0.1, y=(3.0, 4.0))
     bpy.context.view_layer.update()
@@ -551,7 +552,12 @@ def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_tha
     scene.frame_set(60)
     bpy.ops.softground.live()
     assert [ground_mesh.is_baked(baked_ground.display_mesh_of(each)) for each in (crate, slab)] == [True, False]
-    bpy.data.objects.remove(baked_ground.display_mesh_of(crate))
+    shown = baked_ground.display_mesh_of(crate)
+    if by == "key":
+        with bpy.context.temp_override(selected_objects=[shown]):
+            bpy.ops.object.delete()
+    else:
+        bpy.data.objects.remove(shown)
     scene.frame_set(61)
     assert not live.is_on()
     assert live.refusal().startswith("Live mode has ended: a ground or its prints are gone")

@@ -266,3 +266,17 @@ def test_nothing_breaks_below_the_floor_of_the_layer():
     uncut = cells.lowest[0] > -0.29
     assert (cells.standing[:30][uncut[:30]] >= -0.02 - 1e-12).all()
     assert cells.cut_height > 0.0
+
+
+@pytest.mark.parametrize("slope", [0.6, 1.0])
+@pytest.mark.parametrize("depth", [0.02, 0.12])
+def test_a_hillside_is_no_wall(slope, depth):
+    broken = []
+    for rise in (0.0, slope):
+        cells, walls, window = trench(0.01, "snow", bottom=-depth)
+        hill = rise * window.centres(0.01)[0] + np.zeros_like(cells.terrain)
+        cells.terrain, cells.pressed, cells.lowest = hill, hill.copy(), cells.lowest + hill
+        cells.crumble(pieces(window, 0.01, walls.crumbling), np.zeros(cells.loose.shape, bool))
+        broken.append(cells.loose)
+    np.testing.assert_allclose(broken[1], broken[0], atol=1e-12)
+    assert broken[0].any() == (depth > 0.06)
