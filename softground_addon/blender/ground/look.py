@@ -39,6 +39,11 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     return sum(slot.material is not None and slot.material.get(OVER) is not None for slot in obj.material_slots)
 
 
+def is_over_theirs(obj: bpy.types.Object) -> bool:
+    """True if an object shows a material that was mixed over one of the user's."""
+    return any(slot.material is not None and slot.material.get(OVER) is not None for slot in obj.material_slots)
+
+
 def take_off(obj: bpy.types.Object) -> None:
     """Give an object the user's materials back, over which the add-on's were mixed; mixed ones that went with a copy of
     a ground go, too."""

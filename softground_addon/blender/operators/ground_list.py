@@ -105,8 +105,9 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         options = settings.options_of(context)
-        is_printed = any(map(baked_ground.has_remains, settings.listed_grounds(options)))
-        if not is_printed and not response_job.has_layers(options):
+        grounds = settings.listed_grounds(options)
+        has_any = any(map(baked_ground.has_remains, grounds)) or any(map(look.is_over_theirs, grounds))
+        if not has_any and not response_job.has_layers(options):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
         return _may_clear(cls)

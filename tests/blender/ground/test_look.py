@@ -115,3 +115,17 @@ def test_clear_leaves_no_mixed_material_of_a_ground_with_a_finer_copy(short_walk
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
     assert not any(material.get(OVER) for material in bpy.data.materials)
     assert mine.users == users
+
+
+def test_clear_takes_a_look_off_a_ground_without_a_bake(short_walk):
+    ground = field(short_walk)
+    mine = bpy.data.materials.new("Grass")
+    ground.data.materials.append(mine)
+    users = mine.users
+    assert not bpy.ops.softground.clear_bake.poll()
+    assert bpy.ops.softground.apply_look() == {"FINISHED"}
+    assert ground.data.materials[0].get(OVER) == mine
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert (ground.data.materials[0], mine.users) == (mine, users)
+    assert not any(material.get(OVER) for material in bpy.data.materials)
+    assert not bpy.ops.softground.clear_bake.poll()
