@@ -19,7 +19,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut, pieces
+from .carver import EDGE, HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut, pieces
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -253,7 +253,8 @@ class CarvedGround:
             window = step.recorder.window
             cells, _ = self._read(window)
             surface = cells.surface[~cells.closed]
-            window = window.expanded(step.walls.reach(surface, cells.loose + crumbling, self._cell_size))
+            reach = step.walls.reach(surface, cells.loose + crumbling, self._cell_size)
+            window = window.expanded(max(reach, ceil(2 * EDGE / self._cell_size) if crumbling else 0))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
             if crumbling:

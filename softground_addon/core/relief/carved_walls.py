@@ -10,10 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..ground.display_blur import blurred
+from ..ground.display_blur import blurred_window
 from ..ground.places import Places
 from ..numerics.arrays import Array
+from ..numerics.bilinear import sample_map
 from ..numerics.neighbourhood import lowest_within
+from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint, recompose
 
 REACH = 0.012
@@ -22,7 +24,8 @@ ROUGHNESS = 0.012
 """Change of height that needs no wall [m]."""
 
 
-def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> tuple[Array, Array]:
+@sliced
+def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> Slices[tuple[Array, Array]]:
     """Lowest and highest change of height by relief at places, (K,) and (K,) [m].
 
     Infinite where no body carves, and where the carved ground has no wall. Near one, ground with relief lies
@@ -37,19 +40,18 @@ def room(footprints: Sequence[Footprint], places: Places, blur_sigma: float) -> 
     carves = [footprint for footprint in footprints if not len(footprint.contact_cells)]
     if not carves:
         return low, high
-    ground, size = blurred(recompose(footprints), blur_sigma), carves[0].cell_size
+    ground, size = recompose(footprints), carves[0].cell_size
     reach = int(np.ceil(REACH / size))
     for carve in carves:
+        yield
         window = carve.window.expanded(2 * reach)
         point = places.within(carve.window.expanded(reach), size)
         if not len(point):
             continue
-        compression, rim = ground.read(window)
-        heights = rim - compression
-        x, y = places.x[point], places.y[point]
-        cell = window.cells_under(x, y, size)
-        compression, rim = ground.sample(x, y)
-        here = rim - compression
+        compression, rim = blurred_window(ground, window, blur_sigma)
+        heights, (x, y) = rim - compression, (places.x[point], places.y[point])
+        cell, first = window.cells_under(x, y, size), window.corners(size)[0] + size / 2
+        here = sample_map(heights, np.stack([x, y], axis=-1), first, size)
         lowest, highest = lowest_within(heights, reach)[cell], -lowest_within(-heights, reach)[cell]
         walls = highest - lowest > ROUGHNESS
         low[point[walls]] = (lowest - here - ROUGHNESS)[walls]

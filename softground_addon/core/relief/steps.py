@@ -101,7 +101,7 @@ def relief_of_steps(
     places = Places(x, y)
     standing, water = np.zeros((len(places.x), 2)), np.zeros(len(places.x))
     loose, lumped = lying(footprints) if len(places.x) else None, np.zeros(len(places.x))
-    between = room(footprints, places, blur_sigma) if loose else None
+    between = (yield from room.slices(footprints, places, blur_sigma)) if loose else None
     steps = []
     for footprint in footprints:
         yield
