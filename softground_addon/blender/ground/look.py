@@ -36,12 +36,12 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     if not obj.material_slots:
         obj.data.materials.append(ensure_material(surface))
     _show(obj, surface, over_theirs=True)
+    return count_over_theirs(obj)
+
+
+def count_over_theirs(obj: bpy.types.Object) -> int:
+    """Number of an object's slots that show a material that was mixed over one of the user's."""
     return sum(slot.material is not None and slot.material.get(OVER) is not None for slot in obj.material_slots)
-
-
-def is_over_theirs(obj: bpy.types.Object) -> bool:
-    """True if an object shows a material that was mixed over one of the user's."""
-    return any(slot.material is not None and slot.material.get(OVER) is not None for slot in obj.material_slots)
 
 
 def take_off(obj: bpy.types.Object) -> None:

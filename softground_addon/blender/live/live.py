@@ -42,7 +42,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
     if depsgraph is not None and depsgraph.mode == "RENDER":
         return
     if not state.live.follow(scene):
-        forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
+        _lose_grounds()
 
 
 def in_contact(uid: int) -> Contact | None:
@@ -62,8 +62,11 @@ def after_undo() -> None:
     """Handle an undo or redo: the mesh is replaced; live mode goes on if the new one is its own."""
     scene = _scene()
     if state.live is not None and (scene is None or not state.live.show_anew(scene)):
-        left = scene is not None and any(map(baked_ground.has_remains, settings.listed_grounds(scene.softground)))
-        forget(translated("a ground or its prints are gone: clear what is left, and start it again") if left else "")
+        grounds = settings.listed_grounds(scene.softground) if scene else []
+        if any(map(baked_ground.has_remains, grounds)):
+            _lose_grounds()
+        else:
+            forget()
 
 
 def answer(seconds: float | None = None) -> float | None:
@@ -115,6 +118,11 @@ def begin(mode: LiveMode) -> None:
     if scene := mode.current_scene():
         mode.follow(scene)  # the frame may have changed meanwhile
     watch()
+
+
+def _lose_grounds() -> None:
+    """End live mode, as what it shows is gone in part."""
+    forget(translated("a ground or its prints are gone: clear what is left, and start it again"))
 
 
 def forget(reason: str = "") -> None:

@@ -106,7 +106,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         options = settings.options_of(context)
         grounds = settings.listed_grounds(options)
-        has_any = any(map(baked_ground.has_remains, grounds)) or any(map(look.is_over_theirs, grounds))
+        has_any = any(map(baked_ground.has_remains, grounds)) or any(map(look.count_over_theirs, grounds))
         if not has_any and not response_job.has_layers(options):
             cls.poll_message_set(translated("There is no bake on the ground"))
             return False
