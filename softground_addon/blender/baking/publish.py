@@ -181,7 +181,8 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
         )  # all is in the mesh, of which Blender makes another
         if is_draft:
             yield Progress("write", 0.95)
-        trampled = yield from _trampled(footprints, made_with)  # at the end: Give Way may be pressed meanwhile
+        # At the end: Give Way may be pressed meanwhile.
+        trampled = yield from _trampled([*footprints, *record.on_floors], made_with)
         shown = show()
     ground = settings.resolve(made_with.ground) if made_with.ground else shown
     of_steps = {

@@ -11,6 +11,7 @@ from ...core.carried.marks import Marks
 from ...core.carving.carves import with_carves
 from ...core.checks.self_check import bottomed_out, self_check
 from ...core.checks.volumes import check_volumes
+from ...core.composers.floor_prints import floor_prints
 from ...core.composers.pressed_shot import PressedShot, first_with_steps, loads_standing, offsets_mm, press_shot
 from ...core.composers.responses import CharacterResponse, gap_table
 from ...core.debris.debris import Debris
@@ -188,6 +189,9 @@ def _of_ground(
     has_the_rest = number == first_with_steps([each.footprints for each in pressed.records])
     if not has_the_rest and isinstance(terrain, HardOnSoft):
         terrain, brought = replace(terrain, wet={}), {}
+    if has_the_rest:
+        treading = floor_prints.slices(loads, shot.terrain, made_with.cell_size_m)
+        record = replace(record, on_floors=(yield from meanwhile(at_end, treading)))
     marks = yield from meanwhile(
         at_end, marks_of_record.slices(record, terrain, made_with, loads, debris, brought=brought)
     )

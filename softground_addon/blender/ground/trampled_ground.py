@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
-from ..plants import trampling_table
+from ..plants import trampling_table, wind_nodes
 from ..playback import own_data
 from . import baked_ground, ground_mesh, ground_surface
 
@@ -18,9 +18,10 @@ def write(ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUni
     if table is None:
         return
     trampling_table.write(table, ground, trampled, units)
+    shown = baked_ground.display_mesh_of(ground)
+    wind_nodes.follow(table, shown)
     if trampled is None:
         return
-    shown = baked_ground.display_mesh_of(ground)
     place = ground_surface.rest_vertices(shown, units.unit_scale_m, units.frame)
     latest = trampled.latest(place[:, 0], place[:, 1])
     passes = np.where(latest >= 0, trampled.by.passes[latest], 0.0)

@@ -60,6 +60,9 @@ class Arithmetic:
     def arccos(self) -> Self:
         return self.calculated("ARCCOSINE", self, 0.0)
 
+    def sine(self) -> Self:
+        return self.calculated("SINE", self, 0.0)
+
     def floor(self) -> Self:
         return self.calculated("FLOOR", self, 0.0)
 
@@ -83,5 +86,6 @@ _FUNCTIONS: Mapping[np.ufunc, Callable[..., Any]] = {
     np.expm1: lambda _, value: value.exp() - 1.0,
     np.log1p: lambda _, value: (value + 1.0).log(),
     np.sqrt: lambda _, value: value.root(),
+    np.sin: lambda _, value: value.sine(),
     np.arccos: lambda _, value: value.arccos(),
 }

@@ -64,9 +64,9 @@ class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        display_mesh = baked_ground.display_mesh_of(settings.options_of(context).ground)
-        ground_checks.check_playable(display_mesh)
-        weather_modifier.remove(display_mesh)
+        ground = settings.options_of(context).ground
+        ground_checks.check_playable(baked_ground.display_mesh_of(ground))
+        weather.remove(ground)
         return {"FINISHED"}
 
 

@@ -71,11 +71,11 @@ def renew_table(ground: bpy.types.Object) -> None:
     """Write the table of a ground from its record, where there is a bake and no table of this version; see `load`."""
     if trampling_table.is_current(ground) or not baked_ground.is_baked(ground):
         return
-    footprints, about = baked_ground.load(ground)
+    record = baked_ground.record_of(ground)
     with damage_named(ground):
-        units = baked_ground.units_of(about["inputs"])
+        units = baked_ground.units_of(record.about["inputs"])
     trampling_table.ensure(ground)
-    trampled_ground.write(ground, tramplings(footprints), units)
+    trampled_ground.write(ground, tramplings([*record.shaping, *record.on_floors]), units)
 
 
 def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:

@@ -21,7 +21,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
-from . import litter_nodes
+from . import litter_nodes, wind_nodes
 from .table_nodes import Table, any_of, at_element, in_cells, is_over, slot_of, table_of, turned
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
 
@@ -124,15 +124,16 @@ def _fill(graph: NodeGraph) -> None:
     first = graph.node("GeometryNodePointsOfCurve").outputs["Point Index"]
     position = graph.position()
     root, move = at_element(graph, position, first, "POINT"), partial(_put, graph, table, position)
-    geometry = _given_way(graph, table, passes, given, "CURVE", root, move)
+    sway = partial(wind_nodes.lean, table, plant, frame)
+    geometry = _given_way(graph, table, passes, given, "CURVE", root, move, sway)
     graph.next_row()
     move = partial(_instances_moved, graph, table, position)
-    geometry = _given_way(graph, table, passes, geometry, "INSTANCE", position, move)
+    geometry = _given_way(graph, table, passes, geometry, "INSTANCE", position, move, sway)
     graph.next_row()
-    loose = _loose_parts_moved(graph, table, passes, geometry, position)
+    loose = _loose_parts_moved(graph, table, passes, geometry, position, sway)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
     acts = graph.both(
-        graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket),
+        graph.either(table.is_windy.socket, graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket)),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
     )
     graph.finish(graph.choose("GEOMETRY", acts, given, geometry))
@@ -240,14 +241,16 @@ def _given_way(
     domain: str,
     root: Any,
     move: Callable[[Any, _Moved], Any],
+    sway: Callable[[list[Number], Number], Number],
     each: Any = None,
 ) -> Any:
-    """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers."""
+    """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers, and no wind
+    does."""
     rooted, (root,) = graph.captured(geometry, graph.number(root), kinds="VECTOR", domain=domain)
     place = in_cells(graph, table, root.socket)
-    is_near = any_of(graph, rooted, is_over(graph, table, place), domain)
+    is_near = graph.either(table.is_windy.socket, any_of(graph, rooted, is_over(graph, table, place), domain))
     latest = graph.number(graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT"))
-    is_touched = 1.0 - latest.above(0.5 * _NOWHERE)
+    is_touched = (1.0 - latest.above(0.5 * _NOWHERE)).at_least(table.is_windy)
     found, (latest, is_touched) = graph.captured(rooted, latest, is_touched, kinds=("INT", "BOOLEAN"), domain=domain)
     touched = any_of(graph, found, is_touched.socket, domain)
 
@@ -256,7 +259,7 @@ def _given_way(
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
     place = in_cells(graph, table, root.socket)
-    sent = litter_nodes.sent_off(graph, passes, latest, chance)
+    sent = litter_nodes.sent_off(graph, passes, latest, chance, is_touched)
     way_there = zip(place, graph.parts(sent), strict=False)
     place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
     acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT")
@@ -267,7 +270,11 @@ def _given_way(
     )
     remain, bent, bent_further = graph.parts(share)
     is_worn = chance.above(remain)
-    lean = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean)
+    lean, bent = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean), bent + bent_further * is_worn
+    swaying = sway(place, chance) * (1.0 - bent)
+    swayed = wind_nodes.leaning(graph, table, swaying)
+    lean = graph.choose("VECTOR", table.is_windy.socket, lean, graph.vector("ADD", lean, swayed))
+    bent = (bent + swaying).at_most(1.0).where(table.is_windy, otherwise=bent)
     beside = [part.fraction() - 0.5 for part in place]
     slope_x, slope_y, level = graph.parts(ground)
     height = level + slope_x * beside[0] + slope_y * beside[1]
@@ -278,7 +285,7 @@ def _given_way(
     shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
-    fields = (graph.number(lean), graph.number(shift), bent + bent_further * is_worn)
+    fields = (graph.number(lean), graph.number(shift), bent)
     changed, captured = graph.captured(found, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
     lean, shift, bent = (number.socket for number in captured)
     moved = _Moved(lean, shift, bent, is_touched.socket)
@@ -288,9 +295,12 @@ def _given_way(
 
 
 def _put(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
-    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length."""
+    """Move points whose blade leans: what is upright of their way from the root turns, and keeps its length.
+
+    All are moved, those that no sole has touched by nothing: to choose some takes longer.
+    """
     height = graph.dot(position, table.up)
-    return graph.put(geometry, moved.is_touched, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
+    return graph.put(geometry, True, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
 
 
 def _instances_moved(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
@@ -318,7 +328,14 @@ def _instances_moved(graph: NodeGraph, table: Table, position: Any, geometry: An
     return geometry
 
 
-def _loose_parts_moved(graph: NodeGraph, table: Table, passes: _Passes, geometry: Any, position: Any) -> Any:
+def _loose_parts_moved(
+    graph: NodeGraph,
+    table: Table,
+    passes: _Passes,
+    geometry: Any,
+    position: Any,
+    sway: Callable[[list[Number], Number], Number],
+) -> Any:
     """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices.
 
     What each sum takes is stored first: a sum within another is worked out twice.
@@ -345,8 +362,9 @@ def _loose_parts_moved(graph: NodeGraph, table: Table, passes: _Passes, geometry
     root = graph.scaled(total(graph.scaled(position, low)), share)
     mesh = graph.store(mesh, _ROOT, root, True, "FLOAT_VECTOR")
     move, root = partial(_put, graph, table, position), graph.attribute(_ROOT, "FLOAT_VECTOR")
-    mesh = graph.forgotten(_given_way(graph, table, passes, mesh, "POINT", root, move, part), _ROOT, _PART, _LOW)
+    mesh = graph.forgotten(_given_way(graph, table, passes, mesh, "POINT", root, move, sway, part), _ROOT, _PART, _LOW)
     is_near = any_of(graph, given, is_over(graph, table, in_cells(graph, table, position)), "POINT")
+    is_near = graph.either(table.is_windy.socket, is_near)
     mesh = graph.choose("GEOMETRY", is_near, given, mesh)
     joined = graph.node("GeometryNodeJoinGeometry")
     for piece in [mesh, *(socket for socket in parts.outputs if socket.name != "Mesh")]:

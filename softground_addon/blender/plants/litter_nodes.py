@@ -35,10 +35,11 @@ def way(graph: NodeGraph, table: Table, by: Pass, height: Number, frame: Number)
     return graph.vector("MULTIPLY_ADD", graph.attribute(LEAN, "FLOAT_VECTOR"), along.socket, upward)
 
 
-def sent_off(graph: NodeGraph, passes: Any, latest: Number, chance: Number) -> Any:
-    """Way of litter by the first sole that trod on it, a part of it and to another side for each piece [cells]."""
+def sent_off(graph: NodeGraph, passes: Any, latest: Number, chance: Number, is_touched: Number) -> Any:
+    """Way of litter by the first sole that trod on it, a part of it and to another side for each piece [cells]; none
+    of what is not touched."""
     by = graph.at_index(passes.vertices, graph.attribute(SENT_BY, "INT"), latest.socket, "INT")
-    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), chance.socket)
+    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), (chance * is_touched).socket)
     angle = ((chance * 17.0).fraction() - 0.5) * ASIDE
     inputs = {"Vector": sent, "Angle": angle.socket}
     return graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..nodes.node_graph import NodeGraph, Number
-from .trampling_layout import META, TILES
+from .trampling_layout import META, THROWN_FROM, TILES, WIND
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -42,6 +43,7 @@ class Table:
     cell: Number
     gravity: Number
     radius: Number
+    wind: Number
     stands: Any
     rolls: Any
     sinks: Any
@@ -49,6 +51,16 @@ class Table:
     @property
     def up(self) -> Any:
         return self.ways[2]
+
+    @cached_property
+    def is_windy(self) -> Number:
+        """1 where the wind sways what stands, the same everywhere."""
+        return self.wind.above(0.0) * self.wind.graph.number(self.stands)
+
+    @property
+    def metre(self) -> Number:
+        """A metre in Blender units."""
+        return self.radius * (1.0 / THROWN_FROM)
 
 
 def table_of(graph: NodeGraph, chosen: Any) -> Table:
@@ -65,7 +77,8 @@ def table_of(graph: NodeGraph, chosen: Any) -> Table:
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))
     columns, rows, first_frame = graph.parts(graph.at_index(vertices, numbers, 1))
     cell, gravity, radius = graph.parts(graph.at_index(vertices, numbers, 2))
-    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius
+    wind = graph.number(graph.at_index(vertices, graph.attribute(WIND), 0, "FLOAT"))
+    numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius, wind
     space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
     return Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
 

@@ -1,6 +1,6 @@
 """Layout of the table by which plants give way: names of its attributes, and its version."""
 
-MARK, VERSION = "softground_give_way", 3
+MARK, VERSION = "softground_give_way", 4
 """Custom property of the group and of the table's vertices: the version of how they fit together."""
 
 TILES, FIRST, SENT_BY = "softground_tiles", "softground_first", "softground_sent_by"
@@ -11,7 +11,11 @@ ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
 )
 """Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
 direction, of two numbers; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
+WIND = "softground_wind"
+"""Wind of the weather [m/s], where there is any; see `wind_nodes`."""
 META = "softground_meta"
 """Of the first vertex: tiles in a row, cells along a tile, frame rate; of the second: columns, rows, first
 frame; of the third: side of a cell, gravity and radius of a sole's parts, in
 Blender units."""
+THROWN_FROM = 0.05
+"""Radius of the parts of a sole, which throw litter from the speed on from which they throw debris [m]."""

@@ -23,8 +23,6 @@ TRAMPLED, TRAMPLED_ON = "softground_trampled", "softground_trampled_on"
 """Properties of the ground, its table, and of the table, its ground."""
 NEVER = 1e9
 """Frame of passes that never begin."""
-THROWN_FROM = 0.05
-"""Radius of the parts of a sole, which throw litter from the speed on from which they throw debris [m]."""
 
 
 def of(ground: bpy.types.Object) -> bpy.types.Object | None:
@@ -79,6 +77,8 @@ def clear(ground: bpy.types.Object) -> None:
     if table is None:
         return
     if any(table in _tables_of(obj) for obj in bpy.data.objects):
+        table.modifiers.clear()
+        table.animation_data_clear()
         _exchange(table, bpy.data.meshes.new(NAME))
         return
     ground.pop(TRAMPLED, None)
@@ -112,7 +112,7 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     meta = (
         (columns, side, units.frame_rate * stretch),
         (columns * side - 1, rows * side - 1, active.min()),
-        (size / scale, units.gravity_m_s2 / scale, THROWN_FROM / scale),
+        (size / scale, units.gravity_m_s2 / scale, layout.THROWN_FROM / scale),
     )
     is_second = np.ones(len(active) + 2, bool)
     is_second[trampled.first] = is_second[-2:] = False

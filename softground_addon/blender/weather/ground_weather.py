@@ -23,6 +23,7 @@ from ...core.weather.weather import Matter, Span, matter_of, moment_of, span_of
 from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
 from .. import compat, jobs, settings
 from ..ground import baked_ground, ground_mesh, ground_surface
+from ..plants import trampling_table, wind_nodes
 from ..playback import own_data, weather_inputs, weather_modifier, weather_table
 from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
@@ -88,9 +89,22 @@ def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: s
     display_mesh = baked_ground.display_mesh_of(settings.resolve(name))
     modifier = existing or weather_modifier.put(display_mesh, tree)
     weather_keys.follow(display_mesh)
+    _blow(settings.resolve(name))
     if preset:
         set_preset(modifier, preset)
     return modifier
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take the weather off a ground; the bake stays as it is."""
+    weather_modifier.remove(baked_ground.display_mesh_of(ground))
+    _blow(ground)
+
+
+def _blow(ground: bpy.types.Object) -> None:
+    """Let plants on a ground follow the wind of its weather, or none."""
+    if table := trampling_table.of(ground):
+        wind_nodes.follow(table, baked_ground.display_mesh_of(ground))
 
 
 def values_of(ground: bpy.types.Object) -> dict[str, float]:

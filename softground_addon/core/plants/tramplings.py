@@ -74,14 +74,24 @@ class Tramplings:
         return np.where(begun > 0, self.first[slot] + begun - 1, -1)
 
 
+def side_of(fine: float) -> float:
+    """Side of a cell [m], from that of a cell of the bake; from its own side the same.
+
+    Examples
+    --------
+    >>> side_of(0.01), side_of(side_of(0.01)), side_of(0.004)
+    (0.02, 0.02, 0.024)
+    """
+    return fine * max(1, round(CELL / fine))
+
+
 @sliced
 def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
     """Passes of the soles that left footprints; None without any."""
     steps = sorted((step for step in footprints if len(step.contact_cells)), key=lambda step: step.start_frame)
     if not steps:
         return None
-    fine = steps[0].cell_size
-    side = fine * max(1, round(CELL / fine))
+    side = side_of(steps[0].cell_size)
     parts = []
     for step in steps:
         parts.append(passes_of(step, side))

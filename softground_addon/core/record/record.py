@@ -82,6 +82,8 @@ class BakeRecord:
         What bodies carved beside their prints in deep ground, by the numbers of the steps that it goes with.
     carved_with : mapping of step id to StepEdit
         Where the artist had put steps, and how large, when they were carved.
+    on_floors : sequence of Footprint
+        Steps on hard floors, which change no heights; see `composers.floor_prints`.
     """
 
     footprints: Sequence[Footprint]
@@ -92,6 +94,7 @@ class BakeRecord:
     thrown: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     carves: Mapping[int, Footprint] = field(default_factory=dict)
     carved_with: Mapping[str, step_edits.StepEdit] = field(default_factory=dict)
+    on_floors: Sequence[Footprint] = ()
     _laid: dict[int, tuple[Any, Footprint]] = field(default_factory=dict, repr=False, compare=False)
     """Carves that were moved, each with what it follows from; shared by records that differ by edits."""
 
@@ -186,7 +189,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
     again = sorted(record.pressed_again.items())
     prints = [footprint for _, footprint in again if footprint is not None]
     carves = sorted(record.carves.items())
-    names, soles, arrays = to_parts([*record.footprints, *prints, *(carve for _, carve in carves)])
+    names, soles, arrays = to_parts([*record.footprints, *prints, *(carve for _, carve in carves), *record.on_floors])
     content = {
         "format": FORMAT,
         "footprints": names,
@@ -197,6 +200,7 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         "throws": [step_throws.to_json(throw) for throw in record.throws],
         "thrown": [[number, dict(volumes)] for number, volumes in sorted(record.thrown.items())],
         **({"carves": [number for number, _ in carves]} if carves else {}),
+        **({"on_floors": len(record.on_floors)} if record.on_floors else {}),
         **({"carved_with": step_edits.to_json(record.carved_with)} if record.carved_with else {}),
     }
     buffer = io.BytesIO()
@@ -232,7 +236,10 @@ def load(content: bytes) -> BakeRecord:
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
         soles, again = text["soles"], [(number, has_print) for number, has_print in text["pressed_again"]]
         carved = list(text.get("carves", []))
-        baked = _count_baked(len(names) - len(carved), again)
+        of_soft = len(names) - text.get("on_floors", 0)
+        if type(of_soft) is not int or not 0 <= of_soft <= len(names):
+            raise ValueError("more steps on floors than it has")
+        baked = _count_baked(of_soft - len(carved), again)
         if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in carved):
             raise ValueError("carves of steps that it does not have")
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
@@ -242,10 +249,11 @@ def load(content: bytes) -> BakeRecord:
     changes = step_edits.from_json(edits, _EDITS)
     carved_with = step_edits.from_json(text["carved_with"], _EDITS) if "carved_with" in text else {}
     footprints = from_arrays(names, soles, arrays)
-    prints = iter(footprints[baked:])
+    prints = iter(footprints[baked:of_soft])
     pressed_again = {number: next(prints) if has_print else None for number, has_print in again}
     carves = dict(zip(carved, prints, strict=True))
-    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves, carved_with)
+    made = (footprints[:baked], about, changes, pressed_again, how_thrown, thrown, carves, carved_with)
+    return BakeRecord(*made, footprints[of_soft:])
 
 
 def load_edits(content: bytes) -> tuple[dict[str, Any], dict[str, step_edits.StepEdit]]:

@@ -385,6 +385,20 @@ def test_pebbles_roll_along_on_hard_ground_evenly_slowed_down_and_are_pressed_in
     np.testing.assert_allclose(rolled(200.0)[table.sink[number] < -1e-3], 0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["curves", "loose parts"])
+def test_needles_that_no_sole_has_touched_stay_beside_those_that_are_sent_off(shot, kind):
+    place = roots(600)
+    needles = KINDS[kind](place)
+    before = blades(needles)
+    set_input(give_way(needles, kind="PEBBLES"), "Height", 1e4)  # so that the ground is hard
+    table, trodden = trodden_on(place)
+    untouched = np.flatnonzero(table.latest(*place[:, :2].T) < 0)
+    shot.frame_set(200)
+    for was, now in zip(before, blades(needles), strict=True):
+        assert (now[untouched] == was[untouched]).all()
+        assert np.linalg.norm((now - was)[trodden, :2], axis=1).mean() > 0.04
+
+
 def test_pebbles_roll_as_far_in_a_scene_of_other_units(scene):
     scene.unit_settings.scale_length = 0.01
     scene.softground.ground = plane(scene, 600.0, 10)
@@ -405,7 +419,7 @@ def test_litter_is_thrown_by_soles_that_lift_as_fast_as_they_throw_debris_and_li
     vertices.update_tag()
     table, trodden = trodden_on(place)
     number = table.latest(*place[trodden, :2].T)
-    reach = speed**2 / 9.81 - trampling_table.THROWN_FROM
+    reach = speed**2 / 9.81 - trampling_layout.THROWN_FROM
     go_to(shot, 200.0)
     there = blades(leaves)[0]
     far = np.linalg.norm((there - place)[trodden, :2], axis=1)

@@ -225,3 +225,11 @@ def test_half_a_character_anywhere_is_damage(footprints):
     with pytest.raises(InputError, match="clear the bake"):
         record.load(with_text(stored, about={"inputs": {"file": "\ud800"}}))
     assert record.load(with_text(stored, about={"file": "\U0001f43e \\ud800"})).about["file"] == "\U0001f43e \\ud800"
+
+
+@pytest.mark.parametrize("count", [-1, 3, 1.5, "1", None])
+def test_a_record_with_more_steps_on_floors_than_footprints_is_damaged(footprints, count):
+    stored = record.dump(BakeRecord(footprints[1:2], {}, on_floors=footprints[:1]))
+    assert [step.start_frame for step in record.load(stored).on_floors] == [footprints[0].start_frame]
+    with pytest.raises(InputError, match="clear the bake"):
+        record.load(with_text(stored, on_floors=count))

@@ -1,0 +1,69 @@
+"""Wind of the weather on plants: how it comes to the table that they give way by, and nodes that sway them.
+
+The table has a modifier of its own, whose input a driver takes from the weather's slider. It needs no Python, and
+follows keys.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any, cast
+
+import bpy
+
+from ...core.plants.bending import Plant
+from ...core.plants.swaying import swayed
+from .. import compat
+from ..nodes.node_graph import NodeGraph, Number
+from ..nodes.node_modifiers import GroupInput, inputs_of, modifier_with, new_group
+from ..playback import weather_modifier
+from .table_nodes import Table
+from .trampling_layout import WIND
+
+GROUP = MARK = "SoftGround Wind"
+_WIND = "Wind"
+
+
+def follow(table: bpy.types.Object, shown: bpy.types.Object) -> None:
+    """Have the table of a ground's plants follow the wind of the weather on what shows its prints; none without."""
+    known, weather = modifier_with(table, is_wind), cast("Any", weather_modifier.modifier_of(shown))
+    if known is not None:
+        table.driver_remove(compat.input_path(known, inputs_of(known)[_WIND]))
+    if weather is None or weather.node_group is None:
+        if known is not None:
+            table.modifiers.remove(known)
+        return
+    modifier: Any = known or table.modifiers.new(GROUP, "NODES")
+    if known is None:
+        modifier.node_group = next(filter(is_wind, bpy.data.node_groups), None) or _group()
+    driver = table.driver_add(compat.input_path(modifier, inputs_of(modifier)[_WIND])).driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    target = variable.targets[0]
+    target.id, target.data_path = shown, compat.input_path(weather, inputs_of(weather)[_WIND])
+    target.use_fallback_value = True  # of none, where the user removes the weather
+
+
+def is_wind(tree: Any) -> bool:
+    """True of a group that brings wind to a table."""
+    return MARK in tree.keys() and tree.library is None  # noqa: SIM118  (an ID is no mapping)
+
+
+def _group() -> Any:
+    graph = NodeGraph(new_group(GROUP, MARK, [GroupInput(_WIND, 0.0, "Of the weather [m/s]")]))
+    given = graph.node("NodeGroupInput").outputs
+    graph.finish(graph.store(given["Geometry"], WIND, given[_WIND], True))
+    return graph.tree
+
+
+def lean(table: Table, plant: Plant, frame: Number, place: list[Number], chance: Number) -> Number:
+    """Lean of standing plants along the first axis of the table, in right angles."""
+    ahead = place[0] * table.cell
+    return cast("Number", swayed(table.wind, plant.height, table.metre, frame / table.frame_rate, ahead, chance))
+
+
+def leaning(graph: NodeGraph, table: Table, share: Number) -> Any:
+    """Way of what is upright, for its length, that leans along the first axis by a share of a right angle."""
+    sine = (share * (pi / 2)).sine()
+    down = graph.scaled(table.up, ((1.0 - sine * sine).root() - 1.0).socket)
+    return graph.vector("MULTIPLY_ADD", table.ways[0], sine.socket, down)
