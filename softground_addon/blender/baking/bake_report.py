@@ -128,16 +128,16 @@ def unlisted_findings(options: Any) -> list[Finding]:
 
 def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding]:
     """Findings about a ground that changes its shape over time, read at one frame."""
-    modifier = still_ground.changes_with_time(ground) if ground else ""
-    if not (ground and modifier):
+    by = still_ground.changes_shape(ground) if ground else ""
+    if not (ground and by):
         return []
     return [
         Finding(
             "changing_ground",
             "warning",
-            f"Ground '{ground.name}' changes its shape over time by its modifier '{modifier}': it was taken as it is "
-            f"at frame {frame}, where the bake starts.",
-            "Apply the modifier at the frame you want, or switch it off.",
+            f"Ground '{ground.name}' changes its shape over time by {by}: it was taken as it is at frame {frame}, "
+            "where the bake starts.",
+            "Apply that at the frame you want, or switch it off.",
         )
     ]
 
