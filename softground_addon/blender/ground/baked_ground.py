@@ -190,6 +190,7 @@ def write(
         if place.is_draft:
             yield Progress("write", 0.95)
         display_mesh = resolve(place.display_mesh)
+        ground_mesh.note_frame(display_mesh, ground_surface.to_world_of(display_mesh, 1.0, frame) if frame else None)
         playback.attach(display_mesh, place.index[spans.point], spans, resolve(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
         ground_mesh.write_shading(display_mesh, own_data.WATER, place.index, water)
