@@ -56,6 +56,13 @@ def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     return corners
 
 
+def of_corners(mesh: bpy.types.Mesh, of_faces: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[Any]]:
+    """Vertex of each corner, and of values of faces (P,) that of its face, both (L,)."""
+    starts, corners = np.empty(len(of_faces), np.int32), corner_vertices(mesh)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return corners, np.repeat(of_faces, np.diff(np.append(starts, len(corners))))
+
+
 def add_faces(
     mesh: bpy.types.Mesh,
     corner_vertex: NDArray[np.integer],

@@ -7,7 +7,7 @@ thought, everything depends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import IntEnum
 from typing import Any
@@ -78,6 +78,8 @@ class CharacterSettings:
         its soles are parts of it.
     dirty_soles : float
         Film on its soles as the shot starts, over the thickest that they carry.
+    added_as : str
+        Name of its rig as it was added; empty if it still is called so.
     """
 
     armature: ObjectName | None
@@ -91,6 +93,23 @@ class CharacterSettings:
     holds: tuple[FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     body: ObjectName | None = field(default=None, metadata={"said_if_on": True})
     dirty_soles: float = field(default=0.0, metadata={"said_if_on": True, **_on(Acts.RESPONDING)})
+    added_as: str = field(default="", metadata={"said_if_on": True, **_on(Acts.OUTPUT)})
+
+
+def identity_of(said: Mapping[str, Any]) -> str:
+    """Name by which a character of the inputs of a bake was added: the same however often its rig is renamed."""
+    return str(said.get("added_as") or said["name"])
+
+
+def renamed(before: Sequence[Mapping[str, Any]], now: Sequence[CharacterSettings]) -> dict[str, str]:
+    """Present names of the characters in the inputs of a bake, by their names then.
+
+    Those that nothing identifies, as they were removed and added again, follow the order of the list.
+    """
+    present = {each.added_as or each.name: each.name for each in now}
+    names = {str(said["name"]): present.pop(identity_of(said)) for said in before if identity_of(said) in present}
+    others = [str(said["name"]) for said in before if str(said["name"]) not in names]
+    return names | (dict(zip(others, present.values(), strict=True)) if len(others) == len(present) else {})
 
 
 @dataclass(frozen=True)

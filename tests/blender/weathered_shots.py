@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from softground_addon.blender.weather import ground_weather as weather
+from softground_addon.blender.weather import weather_regions
 from softground_addon.core.weather.weather import matter_of
 from tests.blender import shots
 
@@ -28,5 +28,5 @@ def opened_as(surface: str, baked: Path, folder: Path, monkeypatch: pytest.Monke
     path = folder / "shot.blend"
     path.write_bytes(baked.read_bytes())
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    monkeypatch.setattr(weather, "matter_of", lambda _, *of_bake: matter_of(surface, *of_bake))
+    monkeypatch.setattr(weather_regions, "matter_of", lambda _, *of_bake: matter_of(surface, *of_bake))
     return bpy.context.scene

@@ -67,8 +67,8 @@ def path_of_bone(bone: str, channel: str) -> str:
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{channel}'
 
 
-def animated_paths(obj: bpy.types.Object | bpy.types.Key) -> set[tuple[str, int]]:
-    """Data paths and indices that the object's action, strips (muted ones too) and drivers set."""
+def animated_paths(obj: Any) -> set[tuple[str, int]]:
+    """Data paths and indices that the action, strips (muted ones too) and drivers set."""
     animation = obj.animation_data
     if animation is None:
         return set()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
@@ -17,7 +17,7 @@ from ...core.motion.motion import CharacterMotion
 from ...core.record.footprints import Footprint
 from ...core.record.record import load_edits
 from ...core.record.typical_depth import typical_of
-from ...core.settings import BakeSettings
+from ...core.settings import BakeSettings, identity_of
 from .. import settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..jobs import STAGES
@@ -37,16 +37,54 @@ BAKED_AT = "baked_at"
 """Entry of a bake's summary: when it was made [s], the same on all its grounds."""
 
 
-def baked_grounds(options: Any) -> list[bpy.types.Object]:
-    """Grounds of a scene with a bake, without those whose steps a later bake has; the first, where none has any."""
+@dataclass(frozen=True)
+class HeardBake:
+    """A bake on a ground, without what later bakes have of its characters.
+
+    Attributes
+    ----------
+    characters : mapping of str to str
+        Who each of its characters is (`core.settings.identity_of`), by name.
+    later : tuple of (set of str, (int, int))
+        Of each bake that is later: the same of its characters, and its first and last frame.
+    """
+
+    ground: bpy.types.Object
+    frames: tuple[int, int]
+    characters: Mapping[str, str]
+    later: tuple[tuple[frozenset[str], tuple[int, int]], ...]
+
+    def has(self, character: str, frame: float) -> bool:
+        """True if no later bake has what a character does at a frame."""
+        who = self.characters.get(character, character)
+        return not any(who in theirs and first <= frame <= last for theirs, (first, last) in self.later)
+
+    @property
+    def is_heard(self) -> bool:
+        """True if something is left of it."""
+        first, last = self.frames
+        ends = {first, *(end + 1 for _, (_, end) in self.later if first <= end < last)}
+        return not self.later or any(self.has(who, frame) for who in self.characters for frame in ends)
+
+
+def heard_bakes(options: Any) -> list[HeardBake]:
+    """Bakes on the grounds of a scene, each without the steps that a later one has; of the first, where none is left.
+
+    Characters are known whatever their rigs are called by then.
+    """
     grounds = settings.grounds_of(options)
-    baked = [ground for ground in grounds if baked_ground.is_baked(ground)]
-    shots = [_shot_on(ground) for ground in baked]
-    return [
-        ground
-        for at, ground in enumerate(baked)
-        if not any(shots[at].is_before(shot, is_listed_first=other < at) for other, shot in enumerate(shots))
-    ] or grounds[:1]
+    shots = [_shot_on(ground) for ground in grounds if baked_ground.is_baked(ground)]
+    bakes = []
+    for at, (shot, ground) in enumerate(zip(shots, filter(baked_ground.is_baked, grounds), strict=True)):
+        later = [each for n, each in enumerate(shots) if shot.is_before(each, is_listed_first=n < at)]
+        known = tuple((frozenset(each.characters.values()), each.frames) for each in later)
+        bakes.append(HeardBake(ground, shot.frames, shot.characters, known))
+    return [each for each in bakes if each.is_heard] or [HeardBake(each, (0, 0), {}, ()) for each in grounds[:1]]
+
+
+def baked_grounds(options: Any) -> list[bpy.types.Object]:
+    """Grounds of the `heard_bakes` of a scene."""
+    return [each.ground for each in heard_bakes(options)]
 
 
 @dataclass(frozen=True)
@@ -55,18 +93,18 @@ class _BakedShot:
 
     ground: str = ""
     grounds: frozenset[str] = frozenset()
-    characters: frozenset[str] = frozenset()
+    characters: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[int, int] = (0, 0)
     baked_at: float = 0.0
 
     def is_before(self, other: _BakedShot, *, is_listed_first: bool) -> bool:
-        """True if another bake has the steps of this one, and is later, or listed first where nothing tells.
+        """True if another bake has steps of this one, and is later, or listed first where nothing tells.
 
         Each bake writes all grounds of its shot: what it was about and has not written was written since. That tells
         of bakes of earlier versions, which do not know when they were made.
         """
         (start, end), (first, last) = self.frames, other.frames
-        if not self.characters & other.characters or last < start or end < first:
+        if set(self.characters.values()).isdisjoint(other.characters.values()) or last < start or end < first:
             return False
         if self.baked_at != other.baked_at:
             return self.baked_at < other.baked_at
@@ -78,10 +116,10 @@ class _BakedShot:
 
 def _shot_on(ground: bpy.types.Object) -> _BakedShot:
     """The shot of the bake on a ground; one without characters where the record is damaged."""
-    with suppress(InputError, KeyError, TypeError, ValueError, OverflowError):
+    with suppress(AttributeError, InputError, KeyError, TypeError, ValueError, OverflowError):
         inputs = load_edits(bytes(baked_ground.stored_record(ground)))[0]["inputs"]
         grounds = [str(each["ground"]) for each in (inputs, *inputs.get("grounds", ()))]
-        characters = frozenset(str(character["name"]) for character in inputs["characters"])
+        characters = {str(character["name"]): identity_of(character) for character in inputs["characters"]}
         baked_at = ground_mesh.summary_of(baked_ground.display_mesh_of(ground)).get(BAKED_AT, 0.0)
         return _BakedShot(grounds[0], frozenset(grounds), characters, baked_ground.frames_of(inputs), baked_at)
     return _BakedShot()
@@ -128,16 +166,16 @@ def unlisted_findings(options: Any) -> list[Finding]:
 
 def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding]:
     """Findings about a ground that changes its shape over time, read at one frame."""
-    modifier = still_ground.changes_with_time(ground) if ground else ""
-    if not (ground and modifier):
+    by = still_ground.changes_shape(ground) if ground else ""
+    if not (ground and by):
         return []
     return [
         Finding(
             "changing_ground",
             "warning",
-            f"Ground '{ground.name}' changes its shape over time by its modifier '{modifier}': it was taken as it is "
-            f"at frame {frame}, where the bake starts.",
-            "Apply the modifier at the frame you want, or switch it off.",
+            f"Ground '{ground.name}' changes its shape over time by {by}: it was taken as it is at frame {frame}, "
+            "where the bake starts.",
+            "Apply that at the frame you want, or switch it off.",
         )
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import get_args
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ from ...core.ground.presets import validate_material
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
 from ...core.record.record import BakeRecord
-from ...core.settings import Acts, BakeSettings, RegionSettings
+from ...core.settings import Acts, BakeSettings
 from ...core.weather.felt_weather import felt_in
 from .. import jobs, settings
 from ..carried import marks_object
@@ -28,6 +28,7 @@ from ..debris import debris_object
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
+from ..weather import weather_regions
 from . import bake_job, bake_report
 from .publish import sign, with_debris
 
@@ -150,20 +151,12 @@ def _made_with(now: BakeSettings, record: BakeRecord) -> BakeSettings:
             **vars(baked_ground.units_of(inputs)),
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs["shoe_treads"]),
             weather=felt_in(inputs),
-            regions=tuple(map(_region, inputs.get("regions", ()))),
+            regions=weather_regions.regions_in(inputs),
         )
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, InputError):
         raise InputError(
             "The stored record of the footprints does not say what they were pressed with: bake again, and edit then."
         ) from None
-
-
-def _region(said: Mapping[str, Any]) -> RegionSettings:
-    """A region as a record says it."""
-    material = validate_material(said["material"], "record") if said["material"] else None
-    if material:
-        surfaces.find(said["surface"])
-    return RegionSettings(int(said["slot"]), str(said["preset"]), str(said["surface"]), material)
 
 
 def _extent(record: BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -46,8 +46,8 @@ def edits_with_soles(
     """
     if edits == {}:
         return {}
-    grounds, names = list(map(settings.resolve, wanted.soft_grounds)), [each.name for each in wanted.characters]
-    on_ground = {name: edit for each in grounds for name, edit in baked_ground.edits_of(each, names).items()}
+    grounds, now = list(map(settings.resolve, wanted.soft_grounds)), wanted.characters
+    on_ground = {name: edit for each in grounds for name, edit in baked_ground.edits_of(each, now).items()}
     edits = on_ground if edits is None else edits
     named = {edit.sole for edit in edits.values() if edit.sole}
     first = next(iter(grounds), None)

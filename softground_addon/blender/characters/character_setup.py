@@ -60,9 +60,9 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     recognised = yield from recognise(scene, armature, animated_frames(scene, armature))
     length = yield from _shortest_sole(scene, resolve(rig), recognised)
     armature, mapping = resolve(rig), recognised.mapping
+    known = free_name(settings.characters, armature.name)
     character = settings.characters.add()
-    character.name = armature.name
-    character.armature = armature
+    character.name, character.armature = known, armature
     _fill(scene.unit_settings.scale_length, character, mapping)
     character.mass = mass_of(character) or character.mass
     settings.active_character = len(settings.characters) - 1
@@ -240,6 +240,12 @@ def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping
         for bone in source.parts:
             sole.parts.add().name = bone
     _, character.size = sizes_of(unit_scale, character)
+
+
+def free_name(characters: Any, name: str) -> str:
+    """A name for another character, which none of the list was added by; rigs may have been renamed since."""
+    taken = {each.name for each in characters}
+    return next(each for n in range(len(taken) + 1) if (each := f"{name}.{n:03d}" if n else name) not in taken)
 
 
 def title_of(character: SoftGroundCharacter) -> str:

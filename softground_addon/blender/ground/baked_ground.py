@@ -21,7 +21,7 @@ from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample
-from ...core.settings import ObjectName
+from ...core.settings import CharacterSettings, ObjectName, renamed
 from ..carried import marks_object
 from ..debris import debris_object
 from ..jobs import Job, Progress
@@ -190,6 +190,7 @@ def write(
         if place.is_draft:
             yield Progress("write", 0.95)
         display_mesh = resolve(place.display_mesh)
+        ground_mesh.note_frame(display_mesh, ground_surface.to_world_of(display_mesh, 1.0, frame) if frame else None)
         playback.attach(display_mesh, place.index[spans.point], spans, resolve(table), up=up)
         ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
         ground_mesh.write_shading(display_mesh, own_data.WATER, place.index, water)
@@ -310,18 +311,17 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
     return [step for step in record_of(ground).steps if step.footprint]
 
 
-def edits_of(ground: bpy.types.Object, names: Sequence[str] = ()) -> Mapping[str, StepEdit]:
+def edits_of(ground: bpy.types.Object, characters: Sequence[CharacterSettings] = ()) -> Mapping[str, StepEdit]:
     """The artist's edits of the steps of a ground's bake, by step id; none if no bake can be read.
 
-    `names` are those that its characters have now, if the ids are to have these.
+    `characters` are those of now, if the ids are to have their names.
     """
     try:
         about, edits = record.load_edits(bytes(stored_record(ground)))
     except InputError:
         return {}
-    with suppress(KeyError, TypeError, ValueError):  # of damaged inputs, and where there are more or fewer by now
-        before = [str(character["name"]) for character in about["inputs"]["characters"]]
-        return with_names(edits, dict(zip(before, names, strict=True)))
+    with suppress(AttributeError, KeyError, TypeError, ValueError):  # of damaged inputs
+        return with_names(edits, renamed(about["inputs"]["characters"], characters))
     return edits
 
 

@@ -84,6 +84,12 @@ def check_usable(ground: bpy.types.Object) -> None:
             f"Ground '{name}' has shape keys of its own: apply them (Object > Apply > Visual Geometry to Mesh), or "
             "choose a copy without them."
         )
+    parent = ground.parent
+    if parent and ground.parent_type in ("ARMATURE", "LATTICE") and parent.type == ground.parent_type:
+        raise InputError(
+            f"Ground '{name}' is bent by its parent '{parent.name}': apply that (Object > Apply > Visual Geometry to "
+            "Mesh), and parent it again with Object (Ctrl-P > Object)."
+        )
     if taken := own_data.users_own(ground):
         raise InputError(
             f"Ground '{name}' has data of its own called '{taken[0]}', which a bake would need: give it another name "

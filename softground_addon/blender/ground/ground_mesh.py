@@ -21,7 +21,7 @@ from ...core.record.pressed_ground import GroundSample
 from .. import mesh_arrays
 from ..plants import trampling_table
 from ..playback import display_key, own_data, playback, weather_modifier
-from ..playback.own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
+from ..playback.own_data import AGE, COMPRESSION, FRAME, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
 
 SHOWN = ("steps", "max_depth_m", "typical_depth_m", "peak_force_n")
 """Numbers that every summary has."""
@@ -118,6 +118,15 @@ def write(
     mesh.pop(RECORD, None)  # an array that is there would keep its length
     mesh[RECORD] = np.frombuffer(record + bytes(-len(record) % 4), dtype=np.int32)
     write_positions(mesh, raw if shape_keys else display)
+
+
+def note_frame(ground: bpy.types.Object, matrix: Array | None) -> None:
+    """Have materials take places in a frame, by a matrix (4, 4) from the object's space to it; None is the world."""
+    mesh = mesh_of(ground)
+    for name, column in zip(FRAME, (None,) * 4 if matrix is None else matrix[:3].T, strict=True):
+        mesh.pop(name, None)
+        if column is not None:
+            mesh[name] = column.tolist()
 
 
 def write_shading(ground: bpy.types.Object, name: str, index: Indices, values: Array | None) -> None:

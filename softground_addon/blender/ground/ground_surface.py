@@ -173,16 +173,16 @@ def undisturbed_surface(
     triangles = yield from mesh_arrays.triangle_vertices.slices(faces)
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
-    return GroundSurface(name, vertices, surface, triangles, factors, _kinds(slots[faces.triangle_face], regions))
+    kinds = numbers_of(slots[faces.triangle_face], regions)
+    return GroundSurface(name, vertices, surface, triangles, factors, kinds if kinds.any() else None)
 
 
-def _kinds(slots: NDArray[np.int32], regions: Mapping[int, float]) -> Array | None:
-    """Numbers of the kinds of ground, by those of slots (T,); None where it is all of the first."""
+def numbers_of(slots: NDArray[np.int32], regions: Mapping[int, float]) -> Array:
+    """Numbers of the kinds of ground, by those of slots (T,), 0 where these name none."""
     number_of = np.zeros(int(slots.max(initial=0)) + 1)
     for slot, number in regions.items():
         number_of[slot : slot + 1] = number
-    kinds: Array = number_of[slots]
-    return kinds if kinds.any() else None
+    return np.asarray(number_of[slots])
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float, frame: GroundFrame | None = None) -> Array:

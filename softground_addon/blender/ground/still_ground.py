@@ -43,20 +43,20 @@ def changes_with_time(ground: bpy.types.Object) -> str:
     """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
     theirs = [item for item in ground_mesh.users_modifiers(ground) if item.show_viewport]
     keyed = tuple(path for path, _ in animated_paths(ground))
-    return next((item.name for item in theirs if _changes(item, ground, keyed)), "")
+    return next((item.name for item in theirs if _changes(item, keyed, {ground})), "")
 
 
 def changes_shape(obj: bpy.types.Object) -> str:
-    """Name of what changes an object's shape over time: its shape keys or a modifier; empty if nothing does."""
-    keys = getattr(obj.data, "shape_keys", None)
-    moving = keys and keys.animation_data
-    if moving and (moving.action or moving.drivers or any(track.strips for track in moving.nla_tracks)):
+    """Name of what changes an object's shape over time: keys or a modifier; empty if nothing does."""
+    if (keys := getattr(obj.data, "shape_keys", None)) and _is_animated(keys):
         return "its shape keys"
+    if obj.type == "MESH" and _is_animated(obj.data):
+        return "keys on its mesh"
     modifier = changes_with_time(obj)
     return modifier and f"its modifier '{modifier}'"
 
 
-def _changes(modifier: Any, ground: bpy.types.Object, keyed: tuple[str, ...]) -> bool:
+def _changes(modifier: Any, keyed: tuple[str, ...], known: set[bpy.types.ID]) -> bool:
     path = modifier.path_from_id()
     if modifier.type in TIME_DEPENDENT or any(item.startswith(path) for item in keyed):
         return True
@@ -64,6 +64,33 @@ def _changes(modifier: Any, ground: bpy.types.Object, keyed: tuple[str, ...]) ->
         return True
     settings = [getattr(modifier, item.identifier) for item in modifier.bl_rna.properties if item.type == "POINTER"]
     inputs = [value for _, value in node_inputs(modifier)] if modifier.type == "NODES" else []
-    inputs += [*settings, *named_by_nodes(modifier)]
-    followed = [item for item in inputs if isinstance(item, bpy.types.Object) and item != ground]
-    return any(mover_of(item) for item in followed)
+    blocks = [item for item in (*settings, *inputs, *named_by_nodes(modifier)) if isinstance(item, bpy.types.ID)]
+    trees = {node.id_data for node in nodes_of(modifier)}
+    return any(_is_animated(tree) for tree in trees) or any(_acts_over_time(block, known) for block in blocks)
+
+
+def _acts_over_time(block: bpy.types.ID, known: set[bpy.types.ID]) -> bool:
+    """True if what a modifier names moves, or is another from frame to frame; those known are not looked at again."""
+    if block in known:
+        return False
+    known.add(block)
+    if isinstance(block, bpy.types.Collection):
+        return any(_acts_over_time(obj, known) for obj in block.all_objects)
+    if isinstance(block, bpy.types.Object):
+        return bool(mover_of(block) or _bends(block, known))
+    tree = getattr(block, "node_tree", None)
+    image = getattr(getattr(block, "image", None), "source", "")
+    return _is_animated(block) or bool(tree and _is_animated(tree)) or image in ("SEQUENCE", "MOVIE")
+
+
+def _bends(obj: bpy.types.Object, known: set[bpy.types.ID]) -> bool:
+    keyed = tuple(path for path, _ in animated_paths(obj))
+    keys = getattr(obj.data, "shape_keys", None)
+    of_data = [block for block in (obj.data, keys) if block]
+    shown = [item for item in ground_mesh.users_modifiers(obj) if item.show_viewport]
+    return any(map(_is_animated, of_data)) or any(_changes(item, keyed, known) for item in shown)
+
+
+def _is_animated(block: Any) -> bool:
+    """True if keys, strips or drivers set anything of a data block."""
+    return hasattr(block, "animation_data") and bool(animated_paths(block))

@@ -8,7 +8,7 @@ import numpy as np
 from ...core.ground.variation import CHANNELS
 from ...core.numerics.arrays import Array
 from ...core.settings import BakeSettings
-from .. import ground_slots
+from .. import ground_slots, mesh_arrays
 from . import ground_mesh, painted_ground
 
 THIN = 0.08
@@ -36,12 +36,8 @@ def layers(display_mesh: bpy.types.Object, made_with: BakeSettings) -> Array | N
         slots = ground_slots.of_faces(mesh)
         of_faces = np.full(max([*of_slots, int(slots.max(initial=0))]) + 1, default)
         of_faces[list(of_slots)] = list(of_slots.values())
-        starts, corners = np.empty(len(slots), np.int32), np.empty(len(mesh.loops), np.int32)
-        mesh.polygons.foreach_get("loop_start", starts)
-        mesh.loops.foreach_get("vertex_index", corners)
-        count = np.diff(np.append(starts, len(corners)))
         depth[:] = np.inf
-        np.minimum.at(depth, corners, np.repeat(of_faces[slots], count))
+        np.minimum.at(depth, *mesh_arrays.of_corners(mesh, of_faces[slots]))
         depth[np.isinf(depth)] = default
     if is_painted and (factors := painted_ground.factors(display_mesh, mesh, (name,))) is not None:
         depth *= factors[:, 0]

@@ -22,6 +22,7 @@ from ..nodes.shader_graph import Graph, Socket
 from ..playback.own_data import COMPRESSION, LAYER, RIM, SOLE
 from ..playback.weather_nodes import FRESH
 from . import surface_shaders
+from .ground_place import ground_place
 from .surface_shaders import Ground, Look
 from .weather_look import bare, under_weather
 
@@ -116,7 +117,7 @@ def ensure_over(theirs: bpy.types.Material, surface: str) -> bpy.types.Material:
 def shaded(graph: Graph, surface: SurfaceRecord, ground: Ground, *, is_open: bool = True) -> tuple[Socket, Socket]:
     """Shader and relief [m] of a surface under weather; open ground has shades and swells."""
     inputs, relief = _look(graph, surface, ground, is_open=is_open)
-    ragged = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.5, 4.0, 0.6) * 0.5
+    ragged = graph.noise(ground_place(graph), 0.5, 4.0, 0.6) * 0.5
     shown = graph.ramp(graph.attribute(EDGE) + ragged, 0.55, 1.05, 1.0, 0.0)  # noise is around 0.5: all is shown at 0
     # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
     shader = graph.node("ShaderNodeBsdfPrincipled", {**inputs, "Alpha": shown}, subsurface_method="BURLEY")
@@ -144,7 +145,7 @@ def _with_under(graph: Graph, surface: SurfaceRecord, inputs: Mapping[str, Any])
     """Shader inputs of a surface, and of what lies below it where little of the layer is left; in crumbs between."""
     layer = graph.attribute(LAYER)
     is_thin = graph.math("GREATER_THAN", layer, THINNEST)
-    crumbs = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), CRUMBS, 4.0, 0.7)
+    crumbs = graph.noise(ground_place(graph), CRUMBS, 4.0, 0.7)
     pressed = graph.math("DIVIDE", graph.attribute(COMPRESSION), layer + THINNEST) * bare(graph) * is_thin
     share = graph.ramp(pressed + (crumbs + -0.5) * RAGGED, *UNCOVERED) * is_thin
     shade = graph.ramp(crumbs, 0.3, 0.7, 0.6, 1.4)
@@ -163,7 +164,7 @@ def ground_of(graph: Graph) -> Ground:
     compression = graph.attribute(COMPRESSION) * shows
     pressed = graph.ramp(compression, 0.0004, 0.004)
     return Ground(
-        place=graph.out(geometry),
+        place=ground_place(graph),
         pressed=pressed,
         deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM) * shows, 0.0002, 0.005),

@@ -11,6 +11,7 @@ from typing import Any
 from ...core.ground.surfaces import SurfaceRecord
 from ..nodes.shader_graph import Graph, Socket
 from ..playback.weather_nodes import BLOWN, DRIED, FRESH, WATER, WETNESS
+from .ground_place import ground_place
 
 NEW_SNOW = (0.915, 0.935, 0.96)
 SOAKED = (0.42, 0.38, 0.34)
@@ -48,8 +49,7 @@ def _wet(graph: Graph, surface: SurfaceRecord, shown: dict[str, Any], relief: So
     """Colour and relief of wet or dried ground; its gloss is set."""
     colour = shown["Base Color"]
     if surface.wet:
-        place = graph.out(graph.node("ShaderNodeNewGeometry"))
-        late = graph.ramp(graph.noise(place, PATCH, 5.0, 0.6), 0.35, 0.65)
+        late = graph.ramp(graph.noise(ground_place(graph), PATCH, 5.0, 0.6), 0.35, 0.65)
         # Water never lies even: some of it is pale while the rest is still dark. Wet and dry all of it is.
         dried = graph.ramp(graph.attribute(DRIED) * 2.0 + late * -1.0, 0.0, 1.0)
         pale = _times(graph, colour, PALE)
@@ -61,7 +61,7 @@ def _wet(graph: Graph, surface: SurfaceRecord, shown: dict[str, Any], relief: So
     wet, water = graph.attribute(WETNESS), graph.ramp(graph.attribute(WATER), 0.0, FULL)
     dark = _times(graph, colour, SOAKED)
     # Water films shine in patches only: where all is glossy, a low sun makes concrete of it.
-    film = graph.ramp(graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), FILM, 3.0), 0.45, 0.80)
+    film = graph.ramp(graph.noise(ground_place(graph), FILM, 3.0), 0.45, 0.80)
     gloss = graph.blend(wet, shown["Roughness"], graph.blend(film, 0.75, 0.50))
     shown["Roughness"] = graph.blend(water, gloss, 0.04)
     mirror = graph.blend(wet, shown.get("Specular IOR Level", 0.5), graph.blend(film, 0.20, 0.4))

@@ -150,10 +150,11 @@ class NodeGraph:
         inputs |= {} if position is None else {"Position": position}
         return self.node("GeometryNodeSetPosition", inputs).outputs["Geometry"]
 
-    def put_higher(self, geometry: Any, up: Any, height: Any) -> Any:
-        """Put all vertices higher by multiples of a vector; a position is set faster than an offset."""
+    def put_higher(self, geometry: Any, up: Any, height: Any, selection: Any = True) -> Any:
+        """Put vertices higher by multiples of a vector; a position is set faster than an offset."""
         position = self.vector("ADD", self.position(), self.scaled(up, height))
-        return self.node("GeometryNodeSetPosition", {"Geometry": geometry, "Position": position}).outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Selection": selection, "Position": position}
+        return self.node("GeometryNodeSetPosition", inputs).outputs["Geometry"]
 
     def store(
         self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT", domain: str = "POINT"

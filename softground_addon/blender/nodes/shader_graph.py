@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +35,13 @@ class Graph:
         self._tree = tree
         self._depth: dict[str, int] = {}
         self._rows: dict[int, int] = {}
+        self._made: dict[str, Socket] = {}
+
+    def once(self, name: str, make: Callable[[], Socket]) -> Socket:
+        """What is made when it is first asked for, and the same after that."""
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
 
     def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
         """A node with its properties set and its inputs, given by identifier or position, linked or set."""

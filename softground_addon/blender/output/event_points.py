@@ -12,7 +12,7 @@ from bpy.props import EnumProperty
 from ...core.events.events import Event, in_order, label
 from ...core.events.phases import KINDS
 from .. import mesh_arrays, settings
-from ..baking.bake_report import baked_grounds
+from ..baking.bake_report import HeardBake, heard_bakes
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
 from ..translation import translated
@@ -76,9 +76,10 @@ def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
     return shown
 
 
-def events_on(grounds: Iterable[bpy.types.Object]) -> list[Event]:
-    """Events of the bakes on some grounds, in the order of time; errors as of `baked_ground.events_of`."""
-    return in_order(row for ground in grounds for row in baked_ground.events_of(ground))
+def events_of(bakes: Iterable[HeardBake]) -> list[Event]:
+    """Events of some bakes, in the order of time; errors as of `baked_ground.events_of`."""
+    tables = ((bake, baked_ground.events_of(bake.ground)) for bake in bakes)
+    return in_order(row for bake, table in tables for row in table if bake.has(row["character"], row["frame"]))
 
 
 class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
@@ -90,7 +91,7 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = events_on(baked_grounds(settings.options_of(context)))
+        table = events_of(heard_bakes(settings.options_of(context)))
         shown = add_points(settings.scene_of(context), table)
         self.report(
             {"INFO"}, translated("{count} events are the points of '{name}'", count=len(table), name=shown.name)
@@ -115,7 +116,7 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = events_on(baked_grounds(settings.options_of(context)))
+        table = events_of(heard_bakes(settings.options_of(context)))
         count = add_markers(settings.scene_of(context).timeline_markers, table, set(self.phases))
         self.report({"INFO"}, translated("Marked {count} events", count=count))
         return {"FINISHED"}

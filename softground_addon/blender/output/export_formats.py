@@ -101,8 +101,8 @@ def _events(dump: Callable[..., str | bytes], *, is_timed: bool = True) -> Write
 
     def writer(_ground: bpy.types.Object, options: Options) -> list[Path]:
         scene = settings.scene_of(bpy.context)
-        rate, grounds = settings.frame_rate_of(scene), bake_report.baked_grounds(scene.softground)
-        table = between(event_points.events_on(grounds), options.start, options.end, rate)
+        rate, bakes = settings.frame_rate_of(scene), bake_report.heard_bakes(scene.softground)
+        table = between(event_points.events_of(bakes), options.start, options.end, rate)
         content = dump(table, frame_rate=rate) if is_timed else dump(table)
         with files.replacing(options.path) as partial:
             partial.write_bytes(content.encode() if isinstance(content, str) else content)

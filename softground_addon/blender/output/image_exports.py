@@ -97,6 +97,8 @@ def export_images(
     fallen = debris_object.at_rest(thrown, units) if thrown is not None else None
     if fallen is not None:
         reach = max(reach, _farthest(footprints, fallen.place))
+    if weathered and about["inputs"].get("regions"):  # open ground is not the same everywhere
+        reach = max(reach, baked_display_mesh(ground).dimensions.length * units.unit_scale_m)
     solved_in = baked_ground.frame_in(about["inputs"])
     pixels = _pixels(ground, units.unit_scale_m, footprints, reach, resolution, uv_map, solved_in)
     # Last comes a place that no footprint reaches: as it is, so is all the ground around.

@@ -47,8 +47,8 @@ def write(
         camera, or the file cannot be written.
     """
     rate = settings.frame_rate_of(scene)
-    grounds = bake_report.baked_grounds(scene.softground)
-    steps = [(step, ground) for ground in grounds for step in _steps_on(ground, rate, start)]
+    bakes = bake_report.heard_bakes(scene.softground)
+    steps = [(step, bake.ground) for bake in bakes for step in _steps_of(bake, rate, start)]
     recordings = _recordings(samples, path) if samples else []
     heard_steps = _seen_by_camera(scene, steps) if stereo else [step for step, _ in steps]
     heard = sound.footsteps(heard_steps, (end - start + 1) / rate, recordings)
@@ -56,11 +56,13 @@ def write(
         partial.write_bytes(wave_file.dump(heard))
 
 
-def _steps_on(ground: bpy.types.Object, rate: float, start: int) -> list[SoundStep]:
-    """Sounding steps of the bake on a ground, as `sound.steps_of` has them, in the frame of that bake."""
-    record = baked_ground.record_of(ground)
-    footprints = {step.name: step.footprint for step in record.steps if step.footprint}
-    table = baked_ground.events_in_frame(ground, record)
+def _steps_of(bake: bake_report.HeardBake, rate: float, start: int) -> list[SoundStep]:
+    """Sounding steps of a bake, as `sound.steps_of` has them, in the frame of that bake."""
+    record = baked_ground.record_of(bake.ground)
+    prints = [(step.name, step.footprint) for step in record.steps if step.footprint]
+    footprints = {name: each for name, each in prints if bake.has(each.character, each.start_frame)}
+    table = baked_ground.events_in_frame(bake.ground, record)
+    table = [row for row in table if bake.has(row["character"], row["frame"])]
     return sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
 
 

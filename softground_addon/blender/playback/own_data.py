@@ -25,7 +25,9 @@ BUILD_STAMP = "softground_fingerprints"
 """What a bake was made from, as JSON."""
 MADE = "softground_made"
 """Property of a mesh that carries a bake: the names of the attributes that the bake has made, in lines."""
-PROPERTIES = (RECORD, SUMMARY, WARNINGS, BUILD_STAMP, MADE)
+FRAME = tuple(f"softground_place_{part}" for part in ("x", "y", "z", "from"))
+"""Axes of the object's space in the frame of the bake, and its origin there [Blender units]: materials read them."""
+PROPERTIES = (*FRAME, RECORD, SUMMARY, WARNINGS, BUILD_STAMP, MADE)
 """Properties of a mesh that carries a bake."""
 
 

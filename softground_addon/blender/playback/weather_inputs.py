@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -70,10 +71,13 @@ def is_weather(tree: bpy.types.NodeTree) -> bool:
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
-def hold(graph: NodeGraph, inner: Any) -> None:
-    """Have a group do what the one within does."""
+def hold(graph: NodeGraph, inners: Sequence[Any]) -> None:
+    """Have a group do what those within do, one after the other."""
     group = graph.node("NodeGroupInput")
-    held = graph.node("GeometryNodeGroup", node_tree=inner)
-    for name in ("Geometry", *(name for name, *_ in INPUTS)):
-        graph.link(group.outputs[name], held.inputs[name])
-    graph.finish(held.outputs["Geometry"])
+    geometry = group.outputs["Geometry"]
+    for inner in inners:
+        held = graph.node("GeometryNodeGroup", {"Geometry": geometry}, node_tree=inner)
+        for name, *_ in INPUTS:
+            graph.link(group.outputs[name], held.inputs[name])
+        geometry = held.outputs["Geometry"]
+    graph.finish(geometry)

@@ -45,11 +45,11 @@ def separate(modifier: Any) -> bool:
     if tree.users - tree.use_fake_user < 2:
         return False
     tree = modifier.node_group = tree.copy()
-    inner = nodes.within(tree)
-    holder = next(node for node in tree.nodes if getattr(node, "node_tree", None) == inner)
-    inner = holder.node_tree = inner.copy()
-    for name in weather_table.TABLES:
-        weather_table.separate(inner, name)
+    for holder in tree.nodes:
+        if getattr(holder, "node_tree", None):
+            inner = holder.node_tree = holder.node_tree.copy()
+            for name in weather_table.TABLES:
+                weather_table.separate(inner, name)
     return True
 
 
@@ -68,9 +68,6 @@ def remove_unused() -> None:
     """Remove the groups that no modifier has any more."""
     groups = [group for group in bpy.data.node_groups if weather_inputs.is_weather(group)]
     for group in [group for group in groups if not (group.users or group.library)]:
-        inner = nodes.within(group)
+        inners = nodes.groups_within(group)
         bpy.data.node_groups.remove(group)
-        if inner and not inner.users:
-            tables = [weather_table.named(inner, name) for name in weather_table.TABLES]
-            bpy.data.node_groups.remove(inner)
-            weather_table.remove_unused(tables)
+        nodes.remove_unused(inners)

@@ -6,11 +6,14 @@ start, and in a print that since it was made; relief and bounds of prints lose t
 Native Blender data that needs nothing of this add-on. All that follows from a vertex's last contact alone is worked out
 for each moment of `weather_course_nodes`, of which the vertex has the number. What is left for each vertex is linear in
 what `core.weather.weather_places` found.
+
+Where a ground has regions, there is such a group for each that takes weather in its own way, one behind the other, and
+each changes its own vertices alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -50,7 +53,10 @@ such steps."""
 HOLLOW, ABOVE = "softground_weather_hollow", "softground_weather_above"
 """Number of the hollow among those of `weather_course_nodes.HOLLOWS`, 0 where there is none; how far the undisturbed
 ground is above its bottom [m]."""
+REGION = "softground_weather_region"
+"""Number of the group within that changes the vertex; only where there are several."""
 OF_WEATHER = {
+    REGION: "INT",
     BLUR: "FLOAT_VECTOR",
     TRODDEN: "FLOAT_VECTOR",
     PRESSED: "FLOAT",
@@ -71,19 +77,28 @@ standing water [m]; how dry it looks where it was wet to begin with, and how muc
 0 to 1."""
 
 
+Part = tuple[Matter, tuple[float, float]]
+"""What a region is, and least and largest share of its soaking that its hollows have left; see
+`core.weather.weather_places.soaking_shares`."""
+
+
+def groups_within(tree: Any) -> list[Any]:
+    """The groups in a group of weather that have its nodes, one for each region; none where nothing is in it yet."""
+    return [node.node_tree for node in tree.nodes if node.bl_idname == "GeometryNodeGroup" and node.node_tree]
+
+
 def within(tree: Any) -> Any:
-    """The group in a group of weather that has its nodes; None where nothing is in it yet."""
-    return next((node.node_tree for node in tree.nodes if node.bl_idname == "GeometryNodeGroup"), None)
+    """The first of `groups_within`; None without any."""
+    return next(iter(groups_within(tree)), None)
 
 
 @sliced
 def build(
     tree: Any,
+    parts: Sequence[Part],
     *,
-    matter: Matter,
     up: Sequence[float],
     span: Span,
-    soaking: tuple[float, float] = (1.0, 1.0),
     felt: bool = False,
     again: bool = False,
     has_water: bool = True,
@@ -94,14 +109,12 @@ def build(
     ----------
     tree : bpy.types.NodeTree
         From `new`.
-    matter : Matter
-        What the ground is.
+    parts : sequence of Part
+        What the regions of the ground are, by their numbers; at least one.
     up : (3,) floats
         World up in the ground's own space and units, of the length of one metre.
     span : Span
         In frames of the scene.
-    soaking : (float, float)
-        Of the hollows; see `core.weather.weather_places.soaking_shares`.
     felt : bool
         True if steps felt the weather: how deep they are below new snow is then not what the record has.
     again : bool
@@ -109,53 +122,73 @@ def build(
     has_water : bool
         True if the bake itself has water in prints.
     """
-    inner = within(tree)
-    if inner is None:
-        inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
-        add_sockets(inner, INPUTS)
+    before = groups_within(tree)
+    inners = before[: len(parts)]
+    try:
+        for number, part in enumerate(parts):
+            if number == len(inners):
+                inners.append(bpy.data.node_groups.new(WITHIN, "GeometryNodeTree"))
+                add_sockets(inners[-1], INPUTS)
+            fill = partial(
+                _fill,
+                part=part,
+                number=number if len(parts) > 1 else None,
+                up=up,
+                span=span,
+                felt=felt,
+                again=again,
+                has_water=has_water,
+            )
+            yield from _build_within.slices(inners[number], part, span, fill)
+        yield from node_graph.build.slices(tree, partial(hold, inners=inners))
+    except BaseException:
+        remove_unused(inners[len(before) :])
+        raise
+    remove_unused(before[len(parts) :])
+
+
+@sliced
+def _build_within(inner: Any, part: Part, span: Span, fill: Callable[..., None]) -> Slices[None]:
+    """Fill a group within, with the tables that its nodes look up."""
+    matter, soaking = part
     existing = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
     asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
     tables = {name: existing[name] or weather_table.new() for name in asked}
     weather_table.describe(inner, matter, span, soaking)
-    fill = partial(
-        _fill,
-        matter=matter,
-        up=up,
-        span=span,
-        soaking=soaking,
-        felt=felt,
-        again=again,
-        has_water=has_water,
-        tables=tables,
-    )
     try:
-        yield from node_graph.build.slices(inner, fill)
-        yield from node_graph.build.slices(tree, partial(hold, inner=inner))
-    except BaseException:
-        if within(tree) is None:
+        yield from node_graph.build.slices(inner, partial(fill, tables=tables))
+    finally:
+        weather_table.remove_unused({*existing.values(), *tables.values()})
+
+
+def remove_unused(inners: Iterable[Any]) -> None:
+    """Remove those of some groups within that nothing uses any more, with their tables."""
+    for inner in inners:
+        if not inner.users:
+            tables = [weather_table.named(inner, name) for name in weather_table.TABLES]
             bpy.data.node_groups.remove(inner)
-        weather_table.remove_unused(tables.values())
-        raise
-    weather_table.remove_unused(existing.values())
+            weather_table.remove_unused(tables)
 
 
 def _fill(
     graph: NodeGraph,
     *,
-    matter: Matter,
+    part: Part,
+    number: int | None,
     up: Sequence[float],
     span: Span,
-    soaking: tuple[float, float],
     felt: bool,
     again: bool,
     has_water: bool,
     tables: Mapping[str, Any],
 ) -> None:
-    """Make the nodes of a group; see `build`."""
+    """Make the nodes of a group; see `build`. `number` is that of its vertices, None where they are all its own."""
+    matter, soaking = part
     group = graph.node("NodeGroupInput")
     said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
     course = CourseNodes(graph, said, matter, span, soaking, tables[TABLE])
-    ground = _Vertices(graph, course, matter, up, again=again, has_water=has_water, hollows=tables.get(HOLLOWS))
+    hollows = tables.get(HOLLOWS)
+    ground = _Vertices(graph, course, matter, up, number, again=again, has_water=has_water, hollows=hollows)
 
     graph.next_row()
     geometry = group.outputs["Geometry"]
@@ -173,6 +206,8 @@ class _Vertices:
     ----------
     up : (3,) floats
         See `build`.
+    number : int or None
+        See `_fill`.
     again, has_water : bool
         See `build`.
     hollows : bpy.types.Object or None
@@ -185,11 +220,16 @@ class _Vertices:
         course: CourseNodes,
         matter: Matter,
         up: Sequence[float],
+        number: int | None,
         *,
         again: bool,
         has_water: bool,
         hollows: Any,
     ) -> None:
+        self._is_one_of_several = number is not None
+        self._mine: Any = True
+        if number is not None:
+            self._mine = graph.compare("EQUAL", graph.attribute(REGION, "INT"), float(number))
         self._graph, self._course, self._matter, self._up = graph, course, matter, tuple(up)
         self._has_water, self._hollows = has_water, hollows
         self._acts = course.acts
@@ -245,24 +285,25 @@ class _Vertices:
         geometry, (height, fresh, *others) = graph.captured(geometry, height, fresh, *standing, *worn.values())
         standing, looks = others[: len(standing)], others[len(standing) :]
         if worn:
-            blown = graph.forgotten(geometry, COMPRESSION, RIM)  # what takes the place of another is copied
+            # What takes the place of another is copied.
+            blown = geometry if self._is_one_of_several else graph.forgotten(geometry, COMPRESSION, RIM)
             for name, look in zip(worn, looks, strict=True):
-                blown = graph.store(blown, name, look.socket, True)
+                blown = graph.store(blown, name, look.socket, self._mine)
             geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, blown)
         geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
         wetness = self._course.around["wet"]
         if matter.wet:
             wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
-        dry = graph.store(geometry, WETNESS, wetness.socket, True)
+        dry = graph.store(geometry, WETNESS, wetness.socket, self._mine)
         if not standing:
-            return graph.put_higher(dry, self._up, height.socket)
+            return graph.put_higher(dry, self._up, height.socket, self._mine)
         depth = deepest = standing[0]
         if self._has_water:  # which stays
             deepest = graph.number(graph.attribute(WATER)).at_least(depth)
-        wet = graph.store(geometry, WATER, deepest.socket, True)
-        wet = graph.store(wet, WETNESS, wetness.at_least(depth.above(0.0)).socket, True)
+        wet = graph.store(geometry, WATER, deepest.socket, self._mine)
+        wet = graph.store(wet, WETNESS, wetness.at_least(depth.above(0.0)).socket, self._mine)
         geometry = graph.choose("GEOMETRY", floods.socket, dry, wet)
-        return graph.put_higher(geometry, self._up, (height + depth.where(floods)).socket)
+        return graph.put_higher(geometry, self._up, (height + depth.where(floods)).socket, self._mine)
 
     def dried(self, geometry: Any, halo: Number) -> Any:
         """The geometry with how dry ground looks that is wet to begin with."""
@@ -341,7 +382,7 @@ class _Vertices:
         """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
         graph, changed = self._graph, geometry
         for name, value in values.items():
-            changed = graph.store(changed, name, value.socket, True)
+            changed = graph.store(changed, name, value.socket, self._mine)
         return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).socket, geometry, changed)
 
 

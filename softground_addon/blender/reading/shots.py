@@ -240,15 +240,15 @@ def _with_hard(
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     """The ground of a shot, with the material and the spread of pressure that are wanted."""
-    weathering = weathering_of(wanted.weather, wanted.material.layer_depth)
+    regions = shot.regions(wanted)
     return SoftGround(
         shot.terrain,
         wanted.material,
         wanted.pressure,
         shot.variation,
-        weathering,
+        weathering_of(wanted.weather, wanted.material.layer_depth, regions),
         wanted.gravity_m_s2,
-        shot.regions(wanted),
+        regions,
     )
 
 

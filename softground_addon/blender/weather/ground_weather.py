@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.numerics.arrays import Array
+from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, result_of, sliced
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.settings import BakeSettings
 from ...core.weather.felt_weather import felt_in
-from ...core.weather.weather import Matter, Span, matter_of, moment_of, span_of
-from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
+from ...core.weather.weather import Matter, Span, moment_of, span_of
+from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, soaking_shares, weather_places
 from .. import compat, jobs, settings
 from ..ground import baked_ground, ground_mesh, ground_surface
 from ..plants import trampling_table, wind_nodes
@@ -30,6 +30,7 @@ from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
 from . import weather_keys
 from .weather_keys import WeatherBefore
+from .weather_regions import WeatherRegions, regions_of
 
 READING = jobs.Progress("sample", 0.5)
 
@@ -176,24 +177,28 @@ def _fit(
     tree: Any,
     footprints: list[Footprint],
     about: Mapping[str, Any],
-    places: WeatherPlaces,
+    found: tuple[WeatherPlaces, WeatherRegions, Indices],
 ) -> Slices[None]:
     """Fill the group, and write what it reads in the last slice."""
     with damage_named(ground):
         inputs = about["inputs"]
-        (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
+        known, units = of_bake(footprints, about)[0], baked_ground.units_of(inputs)
         first, last = (frame * units.time_stretch for frame in baked_ground.frames_of(inputs))
         rate = units.frame_rate * units.time_stretch
     up = ground_surface.up_of(display_mesh, units.unit_scale_m, units.frame)
+    places, of_ground, kinds = found
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate)
     mesh = ground_mesh.mesh_of(display_mesh)
-    values, hollows = _of_vertices(places, matter, span)
-    given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
+    matters, region_of = of_ground.regions(mesh)
+    regions = region_of[kinds]
+    values, hollows = _of_vertices(places, matters, regions, span)
     again, has_water = nodes.AGAIN in values, nodes.WATER in mesh.attributes
-    yield from nodes.build.slices(tree, **given, felt=known["felt"], again=again, has_water=has_water)
+    parts = [(matter, soaking_shares(places, regions == number)) for number, matter in enumerate(matters)]
+    given = {"up": up.tolist(), "span": span, "felt": known["felt"], "again": again, "has_water": has_water}
+    yield from nodes.build.slices(tree, parts, **given)
     _store(mesh, values)
-    if table := hollows_of(tree):
+    for table in hollows_of(tree):
         weather_table.fill(table, hollows)
     tree[weather_keys.LAST] = span.last
 
@@ -207,31 +212,31 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
 
 
-def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], Matter]:
-    """Input of `weather_places` from a bake, and the weather properties of its ground.
+def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], WeatherRegions]:
+    """Input of `weather_places` from a bake but for the depth of its layers, and the regions of its ground.
 
     By its footprints and what its record says about it; raises what `units_of` and `baked_with` of `baked_ground` do
     for damage.
     """
-    inputs = about["inputs"]
-    material = {name: baked_ground.baked_with(about, name) for name in ("blur_sigma", "layer_depth")}
-    matter = matter_of(str(inputs["surface"]), material["layer_depth"], section_of(footprints))
-    material["layer_depth"] *= baked_ground.baked_with(about, "densest") or 1.0  # how far it can be pressed
+    inputs, regions = about["inputs"], regions_of(footprints, about)
     known = {
         "cell_size": baked_ground.unit_of(inputs, "cell_size_m"),
         "time_stretch": baked_ground.units_of(inputs).time_stretch,
         "felt": felt_in(inputs) is not None,
-        "puddles": matter.soaking is not None,
-        **material,
+        "puddles": any(matter.soaking for matter in regions.matters),
+        "blur_sigma": baked_ground.baked_with(about, "blur_sigma"),
     }
-    return known, matter
+    return known, regions
 
 
-def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mapping[str, Any]) -> jobs.Job[WeatherPlaces]:
-    """Places of the vertices, for weather."""
+def _places(
+    ground: bpy.types.Object, footprints: list[Footprint], about: Mapping[str, Any]
+) -> jobs.Job[tuple[WeatherPlaces, WeatherRegions, Indices]]:
+    """Places of the vertices, for weather; the regions of the ground, and the number of the kind of each vertex."""
     display_mesh = baked_ground.display_mesh_of(ground)
     with damage_named(ground):
-        (known, _), unit_scale = of_bake(footprints, about), baked_ground.unit_of(about["inputs"], "unit_scale_m")
+        known, regions = of_bake(footprints, about)
+        unit_scale = baked_ground.unit_of(about["inputs"], "unit_scale_m")
     name, frame = settings.name_of(display_mesh), baked_ground.frame_in(about["inputs"])
     position = ground_surface.undisturbed_surface(display_mesh, unit_scale, frame=frame).vertices
     yield READING
@@ -242,31 +247,39 @@ def _places(ground: bpy.types.Object, footprints: list[Footprint], about: Mappin
     start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))
     last[last >= NO_CONTACT] = -NO_CONTACT
     start[start <= -NO_CONTACT] = NO_CONTACT
+    kinds = regions.of_vertices(mesh)
     del mesh, display_mesh
-    working = weather_places.slices(footprints, position, relief, start, np.maximum(end, last), **known)
-    return (yield from jobs.meanwhile(READING, working))
+    depth = regions.pressable[kinds]
+    working = weather_places.slices(
+        footprints, position, relief, start, np.maximum(end, last), layer_depth=depth, **known
+    )
+    places = yield from jobs.meanwhile(READING, working)
+    return places.without_prints(kinds == regions.hard), regions, kinds
 
 
-def hollows_of(tree: Any) -> Any:
-    """The table of the hollows that a group of weather fills; None where no water stands."""
-    return weather_table.named(nodes.within(tree), HOLLOWS)
+def hollows_of(tree: Any) -> list[bpy.types.Object]:
+    """The tables of the hollows that a group of weather fills, one for each region in which water stands."""
+    tables = [weather_table.named(inner, HOLLOWS) for inner in nodes.groups_within(tree)]
+    return [table for table in tables if table]
 
 
-def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> dict[str, NDArray[np.float64]]:
-    """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for.
+def store(
+    mesh: bpy.types.Mesh, places: WeatherPlaces, matters: Sequence[Matter], regions: Indices, span: Span
+) -> dict[str, NDArray[np.float64]]:
+    """Give a mesh what the node group reads, of its vertices (V,) in regions; nothing that it does not ask for.
 
     Returns
     -------
     dict of arrays
         The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
     """
-    values, hollows = _of_vertices(places, matter, span)
+    values, hollows = _of_vertices(places, matters, regions, span)
     _store(mesh, values)
     return hollows
 
 
 def _of_vertices(
-    places: WeatherPlaces, matter: Matter, span: Span
+    places: WeatherPlaces, matters: Sequence[Matter], regions: Indices, span: Span
 ) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[np.float64]]]:
     """Attributes that the node group reads, by their names, and the table of the hollows; see `store`."""
     pressed, since, compacted = places.times.T
@@ -283,9 +296,11 @@ def _of_vertices(
         nodes.PRESSED: pressed,
         nodes.MOMENT: np.where(since < NOT_YET, 1 + moment_of(since, span), 0),
     }
-    if matter.snow_depth:
+    if len(matters) > 1:
+        values[nodes.REGION] = regions
+    if any(matter.snow_depth for matter in matters):
         values[nodes.COMPACTED] = compacted
-    if matter.soaking:
+    if any(matter.soaking for matter in matters):
         values[nodes.HOLLOW], values[nodes.ABOVE] = hollow, above
     if (again := places.again[:, 1] < NOT_YET).any():
         values[nodes.AGAIN] = places.again[:, 0]

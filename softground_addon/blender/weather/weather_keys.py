@@ -16,7 +16,7 @@ from .. import compat
 from ..nodes import node_modifiers
 from ..playback import weather_modifier, weather_table
 from ..playback.weather_course_nodes import FIRST, KEYED, STEP, SUMMED, UNITS, field_of, keys_of, switch_of
-from ..playback.weather_nodes import within
+from ..playback.weather_nodes import groups_within, within
 from ..settings import typed
 
 ON_PRINTS = {name: unit for name, unit in UNITS.items() if name != "Drying"}
@@ -35,17 +35,11 @@ def follow(display_mesh: bpy.types.Object) -> None:
     if tree is None or tree.library or LAST not in tree.keys():  # noqa: SIM118  (an ID is no mapping)
         return
     keyed = _keyed(modifier)
-    inner = within(tree)
-    nodes = inner.nodes
-    first = nodes[FIRST].outputs[0].default_value
+    inners = groups_within(tree)
+    first = inners[0].nodes[FIRST].outputs[0].default_value
     span = span_of(first, max([tree[LAST], *(curve.range()[1] for curve in keyed.values())]))
-    changes = [*_set(nodes[STEP].outputs[0], span.step)]
-    changes += _set(nodes[KEYED].outputs[0], len(keyed))
-    for name in SUMMED:
-        curve = keyed.get(name)
-        changes += _set(nodes[switch_of(name)].inputs["Switch"], curve is not None)
-        if curve is not None:
-            changes += _drawn(nodes[keys_of(name)].mapping, _means(curve, span))
+    means = {name: _means(curve, span) for name, curve in keyed.items()}
+    changes = [change for inner in inners for change in _keyed_as(inner.nodes, means, span)]
     if changes and weather_modifier.separate(modifier):
         follow(display_mesh)
         return
@@ -54,8 +48,10 @@ def follow(display_mesh: bpy.types.Object) -> None:
     changed = bool(changes)
     if not keyed:
         last = max([span.last, *(scene.frame_end for scene in display_mesh.users_scene)])
-        changed |= weather_table.follow(inner, values_of(modifier), last - first)
-    if changed:
+        values = values_of(modifier)
+        followed = [weather_table.follow(inner, values, last - first) for inner in inners]
+        changed |= any(followed)
+    for inner in inners if changed else ():
         inner.update_tag()
 
 
@@ -149,6 +145,16 @@ def _means(curve: bpy.types.FCurve, span: Span) -> NDArray[np.float32]:
     frames = span.first + np.arange(round(PARTS * span.step)) + 0.5
     values = np.array([curve.evaluate(frame) for frame in frames])
     return np.append(values.reshape(PARTS, -1).mean(axis=1), curve.evaluate(span.last)).astype(np.float32)
+
+
+def _keyed_as(nodes: Any, means: Mapping[str, NDArray[np.float32]], span: Span) -> Iterator[Callable[[], None]]:
+    """What lets the nodes of a group have these keys and this span, as far as they have others."""
+    yield from _set(nodes[STEP].outputs[0], span.step)
+    yield from _set(nodes[KEYED].outputs[0], len(means))
+    for name in SUMMED:
+        yield from _set(nodes[switch_of(name)].inputs["Switch"], name in means)
+        if name in means:
+            yield from _drawn(nodes[keys_of(name)].mapping, means[name])
 
 
 def _set(socket: Any, value: float | bool) -> Iterator[Callable[[], None]]:

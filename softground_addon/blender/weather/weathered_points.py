@@ -81,7 +81,7 @@ def weathered_points(
     display_mesh = baked_ground.display_mesh_of(ground)
     footprints, about = baked_ground.load(ground)
     with weather.damage_named(ground):
-        known, matter = weather.of_bake(footprints, about)
+        known, of_ground = weather.of_bake(footprints, about)
     count, table = len(position), keyframe_tables(over_time)
     start, end = np.full(count, NOT_YET), np.full(count, -NOT_YET)
     start[table.point] = known["time_stretch"] * table.frame[table.first[:-1]]
@@ -90,10 +90,14 @@ def weathered_points(
     points = bpy.data.meshes.new("SoftGround Points")
     try:
         points.vertices.add(count)
-        places = weather_places(footprints, position, final, start, end, **known)
+        kinds = of_ground.at(display_mesh, about, position)
+        matters, region_of = of_ground.regions(ground_mesh.mesh_of(display_mesh))
+        depth = of_ground.pressable[kinds]
+        places = weather_places(footprints, position, final, start, end, layer_depth=depth, **known)
+        places = places.without_prints(kinds == of_ground.hard)
         span = weather_keys.moments_of(display_mesh)
         modifier: Any = weather_modifier.modifier_of(display_mesh)
-        hollows = weather.store(points, places, matter, span)
+        hollows = weather.store(points, places, matters, region_of[kinds], span)
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))
@@ -120,18 +124,21 @@ def weathered_points(
 @contextmanager
 def _looking_up(tree: Any, columns: Mapping[str, Array]) -> Iterator[Any]:
     """A group of weather as one for other hollows, which may be a linked one; None if it looks up none."""
-    if weather.hollows_of(tree) is None:
+    if not weather.hollows_of(tree):
         yield None
         return
-    table, outer, inner = weather_table.new(), tree.copy(), nodes.within(tree).copy()
+    table, outer, inners = weather_table.new(), tree.copy(), []
     try:
         weather_table.fill(table, columns)
-        inner.nodes[weather_table.HOLLOWS].inputs["Object"].default_value = table
-        next(node for node in outer.nodes if node.bl_idname == "GeometryNodeGroup").node_tree = inner
+        for holder in [node for node in outer.nodes if node.bl_idname == "GeometryNodeGroup"]:
+            inners.append(holder.node_tree.copy())
+            holder.node_tree = inners[-1]
+            if looking := inners[-1].nodes.get(weather_table.HOLLOWS):
+                looking.inputs["Object"].default_value = table
         yield outer
     finally:
-        bpy.data.node_groups.remove(outer)
-        bpy.data.node_groups.remove(inner)
+        for copy in (outer, *inners):
+            bpy.data.node_groups.remove(copy)
         weather_table.remove_unused([table])
 
 

@@ -259,7 +259,7 @@ class EditedSteps:
         solver = GroundSolver(self._ground, HeightField(self._cell_size), self._undisturbed)
         if weathered := solver.weathered:
             for item in self._footprints:
-                weathered.ended(item.end_frame, item.compressed_m3, item.area_m2)
+                weathered.ended(item.end_frame, item.compressed_m3, item.area_m2, item.surface)
         contacts = [OpenContact(item.layout, laid_out=item.imprints) for item in laid.values()]
         number_of = dict(zip(contacts, laid, strict=True))
         prints: dict[int, Footprint | None] = {}

@@ -116,7 +116,8 @@ class Simulation:
             changed, ended = self._solver.step(contacts, start, int(end), frame, grid.timing, is_last=is_last)
             if weathered := self._solver.weathered:
                 for contact in ended:
-                    weathered.ended(float(contact.layout.steps.frames[-1]), contact.compressed, contact.area)
+                    last = float(contact.layout.steps.frames[-1])
+                    weathered.ended(last, contact.compressed, contact.area, contact.made_of)
             start = int(end)
             yield FrameResult(
                 frame,

@@ -90,9 +90,6 @@ def _in_weather(
         trodden.write(footprint.window, values)
 
     def height_at(frame: float) -> Height:
-        level = weathering.level(frame)
-        return lambda x, y: (
-            np.asarray(height(x, y) + (1.0 - trodden.sample(x, y)[0]) * level) if level else height(x, y)
-        )
+        return lambda x, y: np.asarray(height(x, y) + (1.0 - trodden.sample(x, y)[0]) * weathering.levels(frame, x, y))
 
     return height_at

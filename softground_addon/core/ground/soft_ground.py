@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,8 +24,8 @@ class Weathering(Protocol):
         """Distance within which the ground around a cell acts on it [m]."""
         ...
 
-    def level(self, frame: float) -> float:
-        """Height of open ground at a frame above that without weather, where steps press what fell [m]."""
+    def levels(self, frame: float, x: Array, y: Array, /) -> Array | float:
+        """Height of open ground at a frame above that without weather, where steps press what fell, at places [m]."""
         ...
 
     def aged(
@@ -36,7 +37,7 @@ class Weathering(Protocol):
         trodden: SparseGrid,
         pressed: Array,
         frame: float,
-        section: float | None,
+        sections: Mapping[str, float],
     ) -> Array:
         """Compression and rim of cells, as weather has left them by a frame.
 
@@ -50,8 +51,9 @@ class Weathering(Protocol):
             1 in cells that were ever in contact, else 0.
         pressed : (rows, columns) float array
             How far steps compressed each cell, all together [m].
-        section : float or None
-            Volume of a print over its width [m²], None where it is not known yet.
+        sections : mapping of str to float
+            Volume of a print over its width, by the surface that bears most of it, empty of a ground without regions
+            [m²]; as far as known.
 
         Returns
         -------

@@ -38,8 +38,8 @@ class OpenContact:
         Those of which it was last seen what weather had left there.
     surface : Surface or None
         The undisturbed ground around it, where it slides.
-    level : float
-        Height of the open ground as it began, over that without weather [m].
+    met_since : float
+        Scene frame before it began, whose open ground it meets.
     compressed, raised, unplaced : float
         Volumes that it compressed and raised, and that found no place to rise [m³].
     """
@@ -57,7 +57,7 @@ class OpenContact:
         self.material: GroundMaterial | None = None
         self.met: Imprints | None = None
         self.surface: Surface | None = None
-        self.level = 0.0
+        self.met_since = 0.0
         self.compressed = self.raised = self.unplaced = 0.0
         self._load = self._area = self._sinkage = 0.0
         self._moment = np.zeros(3)
@@ -83,6 +83,11 @@ class OpenContact:
     def area(self) -> float:
         """Largest area of contact so far [m²]."""
         return self._area
+
+    @property
+    def made_of(self) -> str:
+        """Surface that bore most of it so far, where the ground has regions; else empty."""
+        return max(self._borne, key=lambda surface: self._borne[surface], default="")
 
     def add_loads(self, imprints: Imprints, first: int, last: int) -> None:
         """Add the loads of some of the imprints, which were pressed."""
@@ -114,5 +119,5 @@ class OpenContact:
             load_frames=frames,
             load_n=layout.force,
             pressed_by=self.pressed_by,
-            surface=max(self._borne, key=lambda surface: self._borne[surface]),
+            surface=self.made_of,
         )

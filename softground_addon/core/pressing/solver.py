@@ -134,13 +134,14 @@ class GroundSolver:
         lowered = self._lowered(window, contact)
         whole[0] += lowered
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
+        deeper = self._deeper(imprints.window, contact)
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
         earlier = state[0].copy()
         for k, step in enumerate(steps):
             compression = compress(
                 state[0],
                 imprints.coverage[step],
-                imprints.target[step] * max(1.0 + contact.level / material.layer_depth, 0.0),
+                imprints.target[step] * deeper,
                 imprints.rate[step],
                 holds=False if imprints.holds is None else imprints.holds[step],
                 compacted=compacted,
@@ -187,9 +188,9 @@ class GroundSolver:
             return
         before = frame - timing.frame_step
         if contact.met is None:
-            contact.level = self.weathered.level(before)
+            contact.met_since = before
         contact.met = imprints
-        met = self.weathered.met(self.state, imprints, contact.level, before, timing.frame_step)
+        met = self.weathered.met(self.state, imprints, contact.met_since, before, timing.frame_step)
         change = quantised(met) - quantised(self.state.read(imprints.window))
         self.state.write(imprints.window, met)
         if change.any():
@@ -199,7 +200,16 @@ class GroundSolver:
 
     def _lowered(self, window: Window, contact: OpenContact) -> Array | float:
         """Depth below open ground that is not recorded, for each trodden cell of a window [m]."""
-        return self.weathered.trodden(window) * contact.level if self.weathered else 0.0
+        if self.weathered is None:
+            return 0.0
+        return self.weathered.trodden(window) * self.weathered.level(contact.met_since, window)
+
+    def _deeper(self, window: Window, contact: OpenContact) -> Array | float:
+        """Factor of the depth of cells: of a layer that new snow has made deeper, or melt less deep."""
+        if self.weathered is None:
+            return 1.0
+        layer_depth = self.cells.ground.layer_depths(window, self.cell_size)
+        return np.maximum(1.0 + self.weathered.level(contact.met_since, window) / layer_depth, 0.0)
 
     def _record(
         self, recorder: FootprintRecorder, frame: float, window: Window, change: NDArray[np.int64], touched: Mask

@@ -27,19 +27,19 @@ class WeatheredCells:
     """
 
     def __init__(self, weathering: Weathering, cell_size: float) -> None:
-        self._weathering = weathering
+        self._weathering, self._cell_size = weathering, cell_size
         self._last = SparseGrid(cell_size, channels=1, fill=-np.inf)
         """Scene frame at which each cell changed last."""
         self._trodden = SparseGrid(cell_size, channels=1)
         """1 where it was ever in contact."""
         self._pressed = SparseGrid(cell_size, channels=1)
         """How far steps compressed it, all together [m]."""
-        self._sections: list[tuple[float, float]] = []
+        self._sections: list[tuple[float, float, str]] = []
 
-    def ended(self, frame: float, compressed: float, area: float) -> None:
-        """A contact ended at a scene frame, after it compressed a volume [m³] with an area [m²]."""
+    def ended(self, frame: float, compressed: float, area: float, surface: str) -> None:
+        """A contact ended at a scene frame, after it compressed a volume [m³] with an area [m²] of some surface."""
         if area > 0:
-            self._sections.append((frame, compressed / np.sqrt(area)))
+            self._sections.append((frame, compressed / np.sqrt(area), surface))
 
     def note(self, window: Window, changed: Array, touched: Mask) -> None:
         """Cells of a window (rows, columns) changed at scene frames, -inf where none did, and some were in contact."""
@@ -54,19 +54,19 @@ class WeatheredCells:
         """Cells of a window that were ever in contact, (rows, columns)."""
         return self._trodden.read(window)[0] > 0
 
-    def level(self, frame: float) -> float:
-        """Height of open ground [m]."""
-        return self._weathering.level(frame)
+    def level(self, frame: float, window: Window) -> Array | float:
+        """Height of open ground in the cells of a window [m]."""
+        return self._weathering.levels(frame, *np.meshgrid(*window.centres(self._cell_size)))
 
-    def met(self, ground: HeightField, imprints: Imprints, level: float, frame: float, frame_step: float) -> Array:
+    def met(self, ground: HeightField, imprints: Imprints, since: float, frame: float, frame_step: float) -> Array:
         """Compression and rim that a contact begins on, (2, rows, columns), as they are recorded [m].
 
         Parameters
         ----------
         imprints : Imprints
             Where it will press and raise the ground.
-        level : float
-            Height of open ground for what it has not touched yet [m].
+        since : float
+            Scene frame of the open ground for what it has not touched yet.
         frame, frame_step : float
             Scene frame before it begins, and how many are between those that are recorded.
         """
@@ -78,7 +78,6 @@ class WeatheredCells:
         stale &= last < frame - 0.5 * frame_step
         state = ground.read(window)
         if stale.any():
-            section = self._section(frame)
             aged = self._weathering.aged(
                 ground,
                 window,
@@ -86,15 +85,18 @@ class WeatheredCells:
                 trodden=self._trodden,
                 pressed=self._pressed.read(window)[0],
                 frame=frame,
-                section=section,
+                sections=self._mean_sections(frame),
             )
             state = np.where(stale, aged, state)
         new = pressed & ~self.trodden(window)
-        state[0] -= new * level
+        state[0] -= new * self.level(since, window)
         self.note(window, np.where(new, frame, -np.inf), new)
         return state
 
-    def _section(self, frame: float) -> float | None:
-        """Mean volume over width of the prints that ended by a frame [m²]."""
-        known = [section for ended, section in self._sections if ended <= frame]
-        return fsum(known) / len(known) if known else None
+    def _mean_sections(self, frame: float) -> dict[str, float]:
+        """Mean volume over width of the prints that ended by a frame, by their surface [m²]."""
+        known: dict[str, list[float]] = {}
+        for ended, section, surface in self._sections:
+            if ended <= frame:
+                known.setdefault(surface, []).append(section)
+        return {surface: fsum(sections) / len(sections) for surface, sections in known.items()}

@@ -7,7 +7,7 @@ new snow down to the ground.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,8 +15,9 @@ import numpy as np
 
 from ..ground.display_blur import CUT_OFF, blurred_window
 from ..ground.heightfield import HeightField
+from ..ground.regions import Regions
 from ..ground.sparse_grid import SparseGrid, Window
-from ..numerics.arrays import Array
+from ..numerics.arrays import Array, Mask
 from .weather import PARTS, Span, matter_of
 from .weather_course import Course, Weather, course_of
 from .weather_places import SIGMAS, shares
@@ -69,9 +70,13 @@ def felt_in(inputs: Mapping[str, Any]) -> FeltWeather | None:
     return weather
 
 
-def weathering_of(weather: FeltWeather | None, layer_depth: float) -> PrintsInWeather | None:
-    """Prints under weather; None if steps feel none."""
-    return PrintsInWeather(weather, layer_depth) if weather else None
+def weathering_of(
+    weather: FeltWeather | None, layer_depth: float, regions: Regions | None = None
+) -> PrintsInWeather | RegionsInWeather | None:
+    """Prints under weather, in each region by its own surface and layer; None if steps feel none."""
+    if weather is None:
+        return None
+    return RegionsInWeather(weather, regions) if regions else PrintsInWeather(weather, layer_depth)
 
 
 class PrintsInWeather:
@@ -81,6 +86,8 @@ class PrintsInWeather:
     ----------
     layer_depth : float
         Of the loose layer [m].
+    region : str
+        Surface of the prints by whose volume wind fills them; see `ground.soft_ground.Weathering.aged`.
 
     Examples
     --------
@@ -91,7 +98,8 @@ class PrintsInWeather:
     0.289
     """
 
-    def __init__(self, weather: FeltWeather, layer_depth: float) -> None:
+    def __init__(self, weather: FeltWeather, layer_depth: float, region: str = "") -> None:
+        self._region = region
         self._weather, self._span = weather, Span(weather.first, weather.last, weather.frame_rate)
         self._matter = matter_of(weather.surface, layer_depth, 0.0)
         self._levels: dict[float, float] = {}
@@ -100,6 +108,10 @@ class PrintsInWeather:
     def reach(self) -> float:
         """Radius of the ground that a weathered cell depends on [m]."""
         return (CUT_OFF + 1.0) * SIGMAS[-1]
+
+    def levels(self, frame: float, *_places: Array) -> float:
+        """Rise of open ground by a scene frame, the same at all places [m]."""
+        return self.level(frame)
 
     def level(self, frame: float) -> float:
         """Rise of open ground by a scene frame [m]; 0 where steps tread new snow down to the ground."""
@@ -119,10 +131,10 @@ class PrintsInWeather:
         trodden: SparseGrid,
         pressed: Array,
         frame: float,
-        section: float | None,
+        sections: Mapping[str, float],
     ) -> Array:
         """Compression and rim of cells, as weather has left them by a frame; see `ground.soft_ground.Weathering`."""
-        course = self._course(frame, section)
+        course = self._course(frame, sections.get(self._region))
         share = np.moveaxis(shares(course.since(since, course.variance)), -1, 0)
         unfilled = course.since(since, course.unfilled)
         weathered = _rounded(ground, window, SIGMAS, share) * unfilled
@@ -140,6 +152,50 @@ class PrintsInWeather:
     def _course(self, frame: float, section: float | None) -> Course:
         matter = replace(self._matter, section=section) if section else replace(self._matter, drifts_from=None)
         return course_of(self._weather, matter, frame=frame, span=self._span)
+
+
+class RegionsInWeather:
+    """Prints under weather on a ground of several kinds; a `ground.soft_ground.Weathering`.
+
+    Each cell is as on a ground that is all of its kind. Hard floors, and what is beside the ground, stay as they are.
+
+    Parameters
+    ----------
+    weather : FeltWeather
+        Of any surface.
+    """
+
+    def __init__(self, weather: FeltWeather, regions: Regions) -> None:
+        self._regions = regions
+        self._of_kinds = [
+            PrintsInWeather(replace(weather, surface=kind.surface), kind.material.layer_depth, kind.surface)
+            for kind in regions.kinds
+        ]
+
+    @property
+    def reach(self) -> float:
+        """Radius of the ground that a weathered cell depends on [m]."""
+        return self._of_kinds[0].reach
+
+    def levels(self, frame: float, x: Array, y: Array, /) -> Array:
+        """Rise of open ground by a scene frame at places [m]."""
+        levels = np.zeros(np.shape(x))
+        for there, kind in self._parts(x, y):
+            levels[there] = kind.level(frame)
+        return levels
+
+    def aged(self, ground: HeightField, window: Window, **known: Any) -> Array:
+        """Compression and rim of cells, as weather has left them by a frame; see `ground.soft_ground.Weathering`."""
+        weathered = ground.read(window)
+        for there, kind in self._parts(*np.meshgrid(*window.centres(ground.cell_size))):
+            weathered[:, there] = kind.aged(ground, window, **known)[:, there]
+        return weathered
+
+    def _parts(self, x: Array, y: Array) -> Iterator[tuple[Mask, PrintsInWeather]]:
+        """Places of each kind of ground that is among them, and what weather does to it."""
+        number = self._regions.where.interpolated(x, y)[-1]
+        for kind in np.unique(number[number >= 0]):
+            yield number == kind, self._of_kinds[int(kind)]
 
 
 def _rounded(grid: SparseGrid, window: Window, sigmas: Sequence[float], share: Array) -> Array:

@@ -234,6 +234,10 @@ class Matter:
     pales: bool
 
 
+HARD_FLOOR = Matter(0.0, WATER_DENSITY, None, None, 0.0, wet=False, pales=False)
+"""A floor of stone or planks: new snow lies on it and melts, and rain wets it; nothing else happens to it."""
+
+
 def matter_of(surface: str, layer_depth: float, section: float) -> Matter:
     """Response of a surface to weather; `layer_depth` of its loose layer [m]."""
     of = surfaces.find(surface)

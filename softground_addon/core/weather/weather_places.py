@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..ground.display_blur import CUT_OFF, blurred, blurred_window
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, overlaps, side_by_side
-from ..numerics.arrays import Array
+from ..numerics.arrays import Array, Mask
 from ..numerics.cell_keys import among, keys_at, keys_of
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint, recompose
@@ -67,6 +67,18 @@ class WeatherPlaces:
     blur_before: Array
     again: Array
 
+    def without_prints(self, where: Mask) -> WeatherPlaces:
+        """The same, but that some of the places are open ground."""
+        bare = {
+            each.name: np.where(where[:, None], OPEN_GROUND.get(each.name, 0.0), getattr(self, each.name))
+            for each in fields(self)
+        }
+        return WeatherPlaces(**bare)
+
+
+OPEN_GROUND: Mapping[str, Sequence[float]] = {"times": (NOT_YET, NOT_YET, 0.0), "again": (-NOT_YET, NOT_YET)}
+"""Values of ground that nobody ever stepped on; all others are 0."""
+
 
 def section_of(footprints: Sequence[Footprint]) -> float:
     """Mean volume of a print over its width [m²], as wind fills it: the width is that of a square of its area."""
@@ -84,7 +96,7 @@ def weather_places(
     *,
     cell_size: float,
     blur_sigma: float,
-    layer_depth: float,
+    layer_depth: Array | float,
     time_stretch: float = 1.0,
     felt: bool = False,
     puddles: bool = True,
@@ -102,7 +114,7 @@ def weather_places(
         far in the future and far in the past.
     cell_size, blur_sigma : float
         [m].
-    layer_depth : float
+    layer_depth : (K,) float array or float
         How far the loose layer can be pressed [m].
     time_stretch : float
         Frames of the animation for each frame of the footprints.
@@ -133,8 +145,8 @@ def weather_places(
     if felt:
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
         ((compression,),) = yield from _sampled(_pressed(footprints, cell_size), widths[:1], *places)
-    filling = footprints if puddles else ()
-    pool, levels = yield from _pools(filling, ground, position, blur_sigma, layer_depth, time_stretch)
+    filling, layers = footprints if puddles else (), np.broadcast_to(layer_depth, alike.shape)[each]
+    pool, levels = yield from _pools(filling, ground, position, blur_sigma, layers, time_stretch)
     blur_before, again = yield from _before_the_last(footprints, position, cell_size, blur_sigma, time_stretch)
     return WeatherPlaces(
         blur=_steps_of_blur(relief, at_sigma)[alike],
@@ -160,12 +172,12 @@ def shares(variance: Array) -> Array:
     return np.asarray(np.clip((np.asarray(variance)[..., None] - low) / (high - low), 0.0, 1.0))
 
 
-def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
-    """Least and largest remaining share of the hollows' soaking; in between, puddles are interpolated.
+def soaking_shares(places: WeatherPlaces, where: Mask | slice = slice(None)) -> tuple[float, float]:
+    """Least and largest remaining share of the soaking of hollows, all or some; in between, puddles are interpolated.
 
     The water of a hollow is linear in this share once all ground there takes up less than falls.
     """
-    capacity, _, soaking = places.pool.T
+    capacity, _, soaking = places.pool[where].T
     known = soaking[capacity > 0]
     return (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
 
@@ -275,7 +287,7 @@ def _pools(
     ground: HeightField,
     position: Array,
     blur_sigma: float,
-    layer_depth: float,
+    layer_depth: Array,
     time_stretch: float,
 ) -> Slices[tuple[Array, Array]]:
     """`WeatherPlaces.pool` and `levels`: of the latest print whose hollow each place lies in."""
@@ -294,7 +306,7 @@ def _pools(
         within = (row[inside] - window.row) * window.columns + column[inside] - window.column
         for hollow in hollows.hollows(rest + rim - compression, cell_size**2):
             wet = inside[np.isin(within, hollow.cells)]
-            pressed = compression.ravel()[hollow.cells].mean() / layer_depth
+            pressed = compression.ravel()[hollow.cells].mean() / layer_depth[wet]
             pool[wet, 0] = hollow.capacity / hollow.catchment
             pool[wet, 1] = position[wet, 2] - hollow.bottom
             pool[wet, 2] = np.exp(-SEALING * pressed)

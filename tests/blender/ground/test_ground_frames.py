@@ -19,6 +19,7 @@ from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.live import live
 from softground_addon.blender.output import sound_exports
 from softground_addon.blender.placement import in_scene
+from softground_addon.blender.playback import own_data
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.state import state
 from softground_addon.blender.viewport import overlay
@@ -191,6 +192,51 @@ def test_prints_sail_along_with_the_deck(short_walk):
     later = as_rendered(shown)[low]
     short_walk.frame_set(30)
     assert later - as_rendered(shown)[low] == pytest.approx((6, 2, 0), abs=1e-4)
+
+
+def rolling(time):
+    return (2 * time, 0.5 * time, 0.1 * np.sin(time)), (0.1 * np.sin(2 * time), 0, 0.2 * time)
+
+
+def picture(scene, frame, path):
+    """What the camera sees at a frame, (24, 24)."""
+    scene.frame_set(frame)
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    pixels = np.array(image.pixels[:]).reshape(24, 24, 4)[..., 0]
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def test_a_look_goes_along_with_the_ground_and_is_gone_with_the_bake(short_walk, tmp_path):
+    ship = deck(short_walk, keyed=rolling)
+    ground, before = short_walk.softground.ground, set(short_walk.softground.ground.data.keys())
+    bpy.ops.softground.load_preset(name="soil")
+    bake(short_walk)
+    bpy.ops.softground.apply_look()
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    short_walk.collection.objects.link(camera)
+    camera.parent, camera.location, short_walk.camera = ship, (1.2, 0.5, 0.5), camera
+    world = short_walk.world = bpy.data.worlds.new("Sky")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Strength"].default_value = 60.0
+    render, cycles = short_walk.render, short_walk.cycles
+    render.engine, cycles.samples, cycles.use_denoising, cycles.max_bounces = "CYCLES", 4, False, 0
+    render.resolution_x = render.resolution_y = 24
+    render.image_settings.file_format = "PNG"
+    first, later = (picture(short_walk, frame, tmp_path / "seen.png") for frame in (1, 50))
+    assert first.std() > 0.01
+    mesh = baked_ground.display_mesh_of(ground).data
+    for name in own_data.FRAME:
+        del mesh[name]
+    mesh.update_tag()
+    sliding = picture(short_walk, 50, tmp_path / "seen.png")
+    assert np.median(np.abs(later - first)) < 0.2 * np.median(np.abs(sliding - first))
+    bake(short_walk)
+    assert set(own_data.FRAME) <= set(baked_ground.display_mesh_of(ground).data.keys())
+    bpy.ops.softground.clear_bake()
+    assert set(ground.data.keys()) == before
 
 
 def test_a_lift_that_speeds_up_presses_prints_deeper(short_walk):

@@ -8,6 +8,7 @@ import pytest
 from mathutils import Euler
 
 from softground_addon.blender import compat
+from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import (
     created_ground,
     ground_checks,
@@ -201,6 +202,139 @@ def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is
     assert np.ptp(shown[:, 2]) > 0.1
     wave.show_viewport = False
     assert not still_ground.changes_with_time(ground)
+
+
+def keyed(block, path, *values):
+    for frame, value in enumerate(values):
+        setattr(block, path, value)
+        block.keyframe_insert(path, frame=10 * frame)
+
+
+def keyed_shape(obj):
+    obj.shape_key_add(name="Basis")
+    keyed(obj.shape_key_add(name="Bent"), "value", 0.0, 1.0)
+
+
+def linked(scene, name, data):
+    obj = bpy.data.objects.new(name, data)
+    scene.collection.objects.link(obj)
+    return obj
+
+
+def keyed_texture(scene, modifier):
+    modifier.texture = bpy.data.textures.new("Hills", "CLOUDS")
+    keyed(modifier.texture, "noise_scale", 0.1, 2.0)
+
+
+def filmed_texture(scene, modifier):
+    modifier.texture = bpy.data.textures.new("Film", "IMAGE")
+    modifier.texture.image = bpy.data.images.new("Film", 4, 4)
+    modifier.texture.image.source = "SEQUENCE"
+
+
+def bent_lattice(scene, modifier):
+    modifier.object = linked(scene, "Cage", bpy.data.lattices.new("Cage"))
+    keyed_shape(modifier.object)
+
+
+def bent_curve(scene, modifier):
+    curve = bpy.data.curves.new("Path", "CURVE")
+    curve.splines.new("POLY").points.add(3)
+    modifier.object = linked(scene, "Path", curve)
+    keyed_shape(modifier.object)
+
+
+def posed_rig(scene, modifier):
+    modifier.object = shots.walker(scene, frames=20)
+
+
+def waving_target(scene, modifier):
+    modifier.target = grid(scene)
+    modifier.target.modifiers.new("Swell", "WAVE")
+
+
+def driven(scene, modifier):
+    modifier.driver_add("strength").driver.expression = "frame / 10"
+
+
+def group_of(modifier):
+    tree = modifier.node_group = bpy.data.node_groups.new("Theirs", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return tree
+
+
+def keyed_node(scene, modifier):
+    keyed(group_of(modifier).nodes.new("ShaderNodeValue").outputs[0], "default_value", 0.0, 1.0)
+
+
+def node_within(scene, modifier):
+    inner = bpy.data.node_groups.new("Inner", "GeometryNodeTree")
+    keyed(inner.nodes.new("ShaderNodeValue").outputs[0], "default_value", 0.0, 1.0)
+    group_of(modifier).nodes.new("GeometryNodeGroup").node_tree = inner
+
+
+def moving_collection(scene, modifier):
+    collection, rock = bpy.data.collections.new("Rocks"), bpy.data.objects.new("Rock", None)
+    collection.objects.link(rock)
+    keyed(rock, "location", (0, 0, 0), (1, 0, 0))
+    named = group_of(modifier).nodes.new("GeometryNodeCollectionInfo")
+    named.inputs["Collection"].default_value = collection
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("DISPLACE", keyed_texture),
+        ("DISPLACE", filmed_texture),
+        ("DISPLACE", driven),
+        ("LATTICE", bent_lattice),
+        ("CURVE", bent_curve),
+        ("ARMATURE", posed_rig),
+        ("SHRINKWRAP", waving_target),
+        ("SURFACE_DEFORM", waving_target),
+        ("NODES", keyed_node),
+        ("NODES", node_within),
+        ("NODES", moving_collection),
+    ],
+)
+def test_what_gives_a_ground_another_shape_from_frame_to_frame_is_named(scene, kind, change):
+    ground = grid(scene)
+    still = ground.modifiers.new("Still", "SUBSURF")
+    assert still.show_viewport
+    modifier = ground.modifiers.new("Theirs", kind)
+    assert not still_ground.changes_with_time(ground)
+    change(scene, modifier)
+    assert still_ground.changes_with_time(ground) == "Theirs"
+    (finding,) = bake_report.ground_findings(ground, 7)
+    assert f"'{ground.name}' changes its shape over time by its modifier 'Theirs'" in finding.message
+
+
+def test_what_stands_still_is_no_change_of_a_ground(scene):
+    ground = grid(scene)
+    wrap = ground.modifiers.new("Wrap", "SHRINKWRAP")
+    wrap.target = grid(scene)
+    wrap.target.modifiers.new("Back", "SHRINKWRAP").target = ground
+    displace = ground.modifiers.new("Hills", "DISPLACE")
+    displace.texture = bpy.data.textures.new("Hills", "CLOUDS")
+    ground.modifiers.new("Rig", "ARMATURE").object = linked(scene, "Rig", bpy.data.armatures.new("Rig"))
+    assert not still_ground.changes_with_time(ground)
+
+
+def test_keys_on_the_points_of_a_ground_are_named(scene):
+    ground = grid(scene)
+    keyed(ground.data.vertices[0], "co", (0, 0, 0), (0, 0, 1))
+    (finding,) = bake_report.ground_findings(ground, 7)
+    assert f"'{ground.name}' changes its shape over time by keys on its mesh" in finding.message
+
+
+@pytest.mark.parametrize(("kind", "data"), [("ARMATURE", "armatures"), ("LATTICE", "lattices")])
+def test_a_ground_that_its_parent_bends_is_refused_with_the_remedy(scene, kind, data):
+    ground = grid(scene)
+    ground.parent = linked(scene, "Bender", getattr(bpy.data, data).new("Bender"))
+    ground_checks.check_usable(ground)
+    ground.parent_type = kind
+    with pytest.raises(InputError, match=f"'{ground.name}' is bent by its parent 'Bender'.*Object"):
+        ground_checks.check_usable(ground)
 
 
 @pytest.mark.parametrize("wanted", slow_but_one([True, False]))

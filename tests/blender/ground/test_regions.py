@@ -9,20 +9,25 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_slots, jobs, preset_files, setting_paths, settings
+from softground_addon.blender import compat, ground_slots, jobs, preset_files, setting_paths, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
 from softground_addon.blender.ground import baked_ground, under_layer
 from softground_addon.blender.materials.materials import MARK, OVER
+from softground_addon.blender.mesh_arrays import positions
 from softground_addon.blender.output import sound_exports
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
+from softground_addon.blender.playback import weather_inputs, weather_modifier, weather_nodes, weather_table
+from softground_addon.blender.weather import weather_regions
 from softground_addon.core.errors import InputError
 from softground_addon.core.events import wave_file
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.regions import MOST
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
+from softground_addon.core.weather.weather import matter_of
+from softground_addon.core.weather.weather_places import section_of
 from tests.blender import command_line, shots
 from tests.blender.grounds import bake, plane, refusal
 
@@ -365,6 +370,124 @@ def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, 
     assert depths_of_layers(ground) is None
     bpy.ops.softground.clear_bake()
     assert not [attribute.name for attribute in ground.data.attributes if attribute.name.startswith("softground")]
+
+
+def weather_by(scene, **values):
+    """Have weather on a bake at these sliders."""
+    bpy.ops.softground.add_weather()
+    modifier = weather_modifier.modifier_of(baked_ground.display_mesh_of(scene.softground.ground))
+    usual = {name: value for name, value, *_ in weather_inputs.INPUTS}
+    for name, identifier in weather_modifier.inputs_of(modifier).items():
+        compat.write_input(modifier, identifier, float(values.get(name.replace(" ", "_"), usual[name])))
+    modifier.id_data.update_tag()
+
+
+def played(scene, frame):
+    """Height [m], wet look, dried look, new snow and what is blown over at the vertices that a bake shows, (V, 5)."""
+    scene.frame_set(frame)
+    shown = baked_ground.display_mesh_of(scene.softground.ground)
+    mesh = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    columns = [positions(mesh)[:, 2]]
+    for name in (weather_nodes.WETNESS, weather_nodes.DRIED, weather_nodes.FRESH, weather_nodes.BLOWN):
+        values = np.zeros(len(mesh.vertices), np.float32)
+        if name in mesh.attributes:
+            mesh.attributes[name].data.foreach_get("value", values)
+        columns.append(values)
+    return np.column_stack(columns)
+
+
+WEATHERS = (
+    {"Temperature": 4.0, "Time_Scale": 20_000.0},
+    {"Snowfall": 3.0, "Temperature": -4.0, "Time_Scale": 900.0},
+    {"Drying": 0.5, "Time_Scale": 2880.0},
+)
+"""Thaw, new snow and a dry day."""
+
+
+def in_weathers(scene):
+    """What is played at two frames without weather, and in each of `WEATHERS`."""
+    shown = {(None, frame): played(scene, frame) for frame in (60, 200)}
+    for number, sliders in enumerate(WEATHERS):
+        weather_by(scene, **sliders)
+        shown |= {(number, frame): played(scene, frame) for frame in (60, 200)}
+    return shown
+
+
+@pytest.mark.parametrize("halves", [("", "mud"), ("dry_sand", ground_slots.HARD)])
+def test_weather_acts_in_each_region_as_on_its_ground_alone(four, halves):
+    choose(np.repeat(halves, 2).tolist())
+    bake(four)
+    y, mixed = positions(four.softground.ground.data)[:, 1], in_weathers(four)
+    far, smoothing = (y > BORDERS[1] + 0.75, y < BORDERS[1] - 0.75), four.softground.material.blur_sigma
+    bpy.ops.softground.clear_bake()
+    choose(("",) * 4)
+    for inside, preset in zip(far, halves, strict=True):
+        if preset == ground_slots.HARD:
+            floor = mixed[None, 200][inside]
+            assert np.array_equal(mixed[0, 200][inside], np.where([1, 0, 0, 0, 0], floor, mixed[0, 200][inside]))
+            assert np.array_equal(mixed[2, 200][inside][:, [0, 2]], floor[:, [0, 2]]), "neither melts nor dries"
+            assert mixed[1, 200][inside, 0] == pytest.approx(np.median(mixed[1, 200][inside, 0])), "but snow lies on it"
+            assert mixed[1, 200][inside, 0].min() > 0.005
+            continue
+        bpy.ops.softground.load_preset(name=preset or "snow")
+        four.softground.debris, four.softground.cell_size = False, 0.02
+        four.softground.material.blur_sigma = smoothing  # which is the ground's, whatever the region
+        bake(four)
+        alone = in_weathers(four)
+        for each, values in alone.items():
+            assert mixed[each][inside] == pytest.approx(values[inside], abs=1e-5), (preset, each)
+        bpy.ops.softground.clear_bake()
+    if "mud" in halves:
+        assert np.median(mixed[0, 200][far[0], 0]) < -0.1, "snow melts"
+        assert not mixed[2, 200][far[0], 2].any()
+        assert np.median(mixed[2, 200][far[1], 2]) > 0.5, "mud dries"
+        assert np.array_equal(mixed[0, 200][far[1], 0], mixed[None, 200][far[1], 0]), "and does not melt"
+
+
+def test_wind_fills_prints_by_those_of_its_own_region(four):
+    choose()
+    result = bake(four)
+    weather_by(four, Wind=9.0, Time_Scale=60.0)
+    about = baked_ground.record_of(four.softground.ground).about
+    regions = weather_regions.regions_of(result.footprints, about)
+    for matter, name in zip(regions.matters, ("snow", "sand", "mud"), strict=False):
+        assert matter.section == section_of([step for step in result.footprints if step.surface == name])
+        assert matter == matter_of(name, matter.snow_depth, matter.section)
+    tree = weather_modifier.modifier_of(baked_ground.display_mesh_of(four.softground.ground)).node_group
+    assert len(weather_nodes.groups_within(tree)) == 4
+    y, before = positions(four.softground.ground.data)[:, 1], played(four, 110)
+    windy = played(four, 2000)
+    for stripe, blown in enumerate((True, True, False, False)):
+        inside = (y < (5.0, *BORDERS)[stripe] - 0.4) & (y > (*BORDERS, -5.0)[stripe] + 0.4)
+        deepest = before[inside, 0].min()
+        filled = windy[inside, 0].min() > 0.5 * deepest
+        assert filled == blown if stripe < 3 else deepest == 0.0
+
+
+def test_weather_of_one_region_is_one_group_and_goes_with_the_bake(four):
+    bake(four)
+    weather_by(four, Snowfall=2.0, Temperature=-4.0, Time_Scale=900.0)
+    bake(four)
+    plain, shown = played(four, 200), baked_ground.display_mesh_of(four.softground.ground)
+    choose(("snow", "", "", ""))
+    bake(four)
+    assert np.array_equal(played(four, 200), plain)
+    tree = weather_modifier.modifier_of(shown).node_group
+    assert len(weather_nodes.groups_within(tree)) == 1
+    assert weather_nodes.REGION not in shown.data.attributes
+    choose()
+    bake(four)
+    assert len(weather_nodes.groups_within(weather_modifier.modifier_of(shown).node_group)) == 4
+    assert weather_nodes.REGION in shown.data.attributes
+    choose(("",) * 4)
+    bake(four)
+    assert np.array_equal(played(four, 200), plain)
+    assert weather_nodes.REGION not in shown.data.attributes
+    bpy.ops.softground.clear_bake()
+    groups = [group.name for group in bpy.data.node_groups if group.name.startswith("SoftGround Weather")]
+    tables = [obj.name for obj in bpy.data.objects if obj.name.startswith(weather_table.NAME)]
+    assert not groups
+    assert not tables
 
 
 def test_soles_carry_what_sticks_onto_a_hard_material(four):

@@ -906,7 +906,7 @@ def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_n
     assert "The bake on 'Crate' is older, and left out of sound and events: bake again" in capfd.readouterr().out
     assert baked_ground.is_baked(crate)
     assert bake_report.baked_grounds(options) == [floor]
-    rows = event_points.events_on(bake_report.baked_grounds(options))
+    rows = event_points.events_of(bake_report.heard_bakes(options))
     assert [(row["frame"], row["contact"], row["phase"]) for row in rows] == [
         (row["frame"], row["contact"], row["phase"]) for row in report["events"]
     ]
@@ -954,6 +954,53 @@ def test_bakes_of_other_times_of_the_shot_are_all_heard(crate):
     bake(scene)
     also(floor)
     assert set(bake_report.baked_grounds(options)) == {crate, floor}
+
+
+def heard_steps(scene, folder, monkeypatch):
+    """Frames at which the steps begin that are heard."""
+    steps = []
+    monkeypatch.setattr(sound, "footsteps", lambda heard, *_: steps.extend(heard) or np.zeros((9, 1)))
+    sound_exports.write(scene, folder / "steps.wav", 1, 84)
+    return sorted(step.frame for step in steps)
+
+
+def test_a_rig_that_was_renamed_between_two_bakes_is_heard_once(crate, tmp_path, monkeypatch):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    also(crate)
+    bake(scene)
+    options.grounds.clear()
+    bpy.data.objects["Walker"].name = "Ann"
+    options.hard_grounds.add().object = crate
+    report = bake(scene).report
+    alone = heard_steps(scene, tmp_path, monkeypatch)
+    also(crate)
+    assert bake_report.baked_grounds(options) == [floor]
+    rows = event_points.events_of(bake_report.heard_bakes(options))
+    assert [(row["frame"], row["contact"]) for row in rows] == [
+        (row["frame"], row["contact"]) for row in report["events"]
+    ]
+    assert heard_steps(scene, tmp_path, monkeypatch) == alone
+
+
+def test_of_an_older_bake_all_is_heard_that_the_later_one_does_not_have(crate, tmp_path, monkeypatch):
+    scene = bpy.context.scene
+    options, floor = scene.softground, scene.softground.ground
+    end = options.frame_end
+    older = bake(scene).report["events"]
+    before = heard_steps(scene, tmp_path, monkeypatch)
+    options.ground, options.frame_start = crate, 40
+    options.hard_grounds.add().object = floor
+    later = bake(scene).report["events"]
+    also(floor)
+    assert bake_report.baked_grounds(options) == [crate, floor]
+    rows = event_points.events_of(bake_report.heard_bakes(options))
+    wanted = [row for row in older if row["frame"] < 40] + later
+    assert [row["frame"] for row in rows] == sorted(row["frame"] for row in wanted)
+    assert len({(row["character"], row["contact"], row["phase"], row["frame"]) for row in rows}) == len(rows)
+    heard = heard_steps(scene, tmp_path, monkeypatch)
+    assert [frame for frame in heard if frame < 40] == [frame for frame in before if frame < 40]
+    assert end > 40
 
 
 def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_it_is_one(crate, tmp_path, monkeypatch):

@@ -619,7 +619,7 @@ CHANGES = {
 def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon):
     about = {"up": (0.0, 0.0, 1.0), "span": span_of(1.0, 60.0, 24.0)}
     kinds = [
-        {"matter": matter_of("sand", 0.2, section), "soaking": soaking, **about}
+        {"parts": [(matter_of("sand", 0.2, section), soaking)], **about}
         for section, soaking in ((0.005, (0.3, 0.9)), (0.008, (0.2, 0.8)))
     ]
     groups = [weather_inputs.new() for _ in kinds]
@@ -713,8 +713,8 @@ def alone(scene, tmp_path, frame):
 def test_hollows_read_compression_against_what_can_be_packed(densest, deepest):
     material = {"blur_sigma": 0.005, "layer_depth": 0.25} | ({"densest": densest} if densest else {})
     units = dict.fromkeys(("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m"), 1.0)
-    known, _ = weather.of_bake([], {"inputs": {**units, "surface": "soil", "material": material, "weather": None}})
-    assert known["layer_depth"] == pytest.approx(deepest)
+    _, regions = weather.of_bake([], {"inputs": {**units, "surface": "soil", "material": material, "weather": None}})
+    assert regions.pressable[0] == pytest.approx(deepest)
 
 
 def test_a_night_of_snow_is_one_slider(opened):

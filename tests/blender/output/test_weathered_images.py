@@ -7,6 +7,7 @@ import pytest
 from softground_addon.blender import compat, jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.mesh_arrays import positions
 from softground_addon.blender.output import image_exports
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.blender.playback import weather_nodes as nodes
@@ -98,6 +99,35 @@ def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame
     for kind, channels in seen.items():
         for number, values in enumerate(channels):
             np.testing.assert_allclose(images[kind][..., number], values, rtol=1e-5, atol=2e-6, err_msg=kind)
+
+
+def test_images_of_a_ground_with_regions_have_the_weather_of_each(opened, tmp_path, monkeypatch):
+    scene = opened("snow", **weathered_shots.SOME)
+    monkeypatch.undo()  # each surface is what it is
+    mesh = scene.softground.ground.data
+    for name, preset in (("White", ""), ("Brown", "mud"), ("Grey", "none")):
+        mesh.materials.append(bpy.data.materials.new(name))
+        mesh.materials[-1].softground_preset = preset
+    y = np.array([face.center.y for face in mesh.polygons])
+    borders = (-0.4, -1.4)
+    mesh.polygons.foreach_set("material_index", np.searchsorted(-np.array(borders), -y).astype(np.int32))
+    mesh.update()
+    scene.softground.detail = "NEVER"
+    jobs.run(bake_job.bake(scene))
+    height, attributes = shown(scene, 30)
+    images = write(scene, tmp_path, 30)
+    places = positions(mesh)[: SIDE**2, 1].reshape(SIDE, SIDE)
+    inside = np.all([np.abs(places - border) > 0.1 for border in borders], axis=0)
+    for name, values, image in (
+        ("height", height, images["displacement"][..., 0]),
+        ("wetness", attributes[nodes.WETNESS], images["weather"][..., 0]),
+        ("fresh", attributes[nodes.FRESH], images["weather"][..., 1]),
+        ("water", attributes[nodes.WATER], images["weather"][..., 2]),
+    ):
+        np.testing.assert_allclose(image[inside], values[inside], rtol=1e-5, atol=2e-6, err_msg=name)
+    water, in_mud = attributes[nodes.WATER], (places < borders[0]) & (places > borders[1])
+    assert water[in_mud].max() > 1e-3
+    assert not water[inside & ~in_mud].any()
 
 
 def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender import settings
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
@@ -98,6 +99,20 @@ def test_edits_go_with_a_character_that_gets_another_name(shot):
     bpy.ops.softground.bake()
     assert baked_ground.edits_of(ground).keys() == {name.replace("Walker", "Ann")}
     np.testing.assert_allclose([each.position for each in baked_ground.load(ground)[0]], before, atol=1e-3)
+
+
+def test_edits_stay_with_their_character_whatever_the_order_of_the_list_and_its_name(shot):
+    folder, plain = shot
+    name = plain["steps"][2]["id"]
+    assert bake(folder, {name: {"move_m": [0.1, 0.2]}}) == 0
+    ground, characters = ground_in(folder / "edited.blend"), bpy.context.scene.softground.characters
+    bpy.data.objects["Walker"].name = "Ann"
+    ball = characters.add()
+    ball.name = "Ball"
+    characters.move(1, 0)
+    now = [settings.character_of(each) for each in characters]
+    assert [each.name for each in now] == ["Ball", "Ann"]
+    assert baked_ground.edits_of(ground, now).keys() == {name.replace("Walker", "Ann")}
 
 
 def test_an_edit_without_a_step_is_kept_and_named(shot):

@@ -11,9 +11,11 @@ from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.display_blur import blurred_window
 from softground_addon.core.ground.heightfield import FlatTerrain, HeightField
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.regions import GroundKind, Regions
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.sparse_grid import SparseGrid, Window
 from softground_addon.core.ground.surfaces import SURFACES
+from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.motion.motion import steps_per_frame
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
@@ -191,7 +193,7 @@ def test_wind_takes_of_a_print_what_it_fills_and_no_more():
     ground.write(WHERE, made)
     trodden = SparseGrid(CELL, channels=1)
     trodden.write(WHERE, made[:1] > 0)
-    known = {"trodden": trodden, "pressed": made[0], "frame": 145.0, "section": 0.05}
+    known = {"trodden": trodden, "pressed": made[0], "frame": 145.0, "sections": {"": 0.05}}
     aged = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
     share = np.exp(
         -w.fill_rate(w.blown_flux(8.0, SURFACES["sand"].drifts_from), 0.05, SURFACES["sand"].density) * 600.0 * SECONDS
@@ -313,3 +315,81 @@ def test_edits_one_after_the_other_end_where_all_at_once_do():
         now = steps.record_with(now, edits)
     assert record.dump(now) == record.dump(with_edits(bake, wanted, ground_in(weather), CELL))
     assert not steps.record_with(now, {}).pressed_again
+
+
+HALVES = (GroundKind("snow", MATERIAL), GroundKind("sand", replace(MATERIAL, layer_depth=0.25, poisson_ratio=0.2)))
+
+
+def side_by_side(weather):
+    """A ground of snow beside sand, with a hard floor further away; and each of the two alone."""
+    x = np.array([-20.0, 0.0, 6.0, 20.0])
+    vertices = np.array([(across, along, 0.0) for across in x for along in (-20.0, 20.0)])
+    first = 2 * np.repeat(np.arange(3), 2)
+    corners = np.tile([[0, 2, 3], [0, 3, 1]], (3, 1)) + first[:, None]
+    soft = corners[first < 4], np.repeat([0.0, 1.0], 2)
+    terrain = MeshTerrain.from_mesh(vertices, soft[0], of_faces=soft[1])
+    regions = Regions(HALVES, terrain)
+    whole = SoftGround(terrain, MATERIAL, weathering=weathering_of(weather, LAYER, regions), regions=regions)
+    alone = [
+        replace(
+            whole,
+            material=kind.material,
+            weathering=weathering_of(replace(weather, surface=kind.surface), kind.material.layer_depth),
+            regions=None,
+        )
+        for kind in HALVES
+    ]
+    return whole, alone
+
+
+def twice_in_each(ground, sides=(-1.5, 1.5)):
+    """Prints of soles that stand twice, one on each side of the border."""
+    both = []
+    for x in sides:
+        loads = two_steps()
+        poses = loads.motion.soles[0].transforms.copy()
+        poses[..., 0, 3] += x
+        both.append(
+            loads_of([box_sole(SIDE, SIDE)], [poses], loads.forces.forces[..., 2], loads.contacts.touching, RATE)
+        )
+    return [step for result in simulate(both, ground, CELL) for step in result.footprints]
+
+
+@pytest.mark.parametrize(
+    "rates",
+    [
+        {"snowfall": 0.05 / SECONDS, "temperature": -5.0},
+        {"temperature": 4.0, "time_scale": 30_000.0},
+        {"wind": 8.0, "time_scale": 300.0},
+        {"snowfall": 2e-5, "temperature": -3.0, "wind": 8.0, "rain": 2e-6, "time_scale": 300.0},
+    ],
+)
+def test_steps_in_each_region_find_the_weather_of_its_own_surface(rates):
+    weather = replace(between(**rates), surface="snow")
+    ground, alone = side_by_side(weather)
+    mixed = twice_in_each(ground)
+    assert {step.surface for step in mixed} == {"snow", "sand"}
+    for kind, only, x in zip(HALVES, alone, (-1.5, 1.5), strict=True):
+        mine = [step for step in mixed if step.surface == kind.surface]
+        expected = twice_in_each(only, (x,))
+        assert len(mine) == len(expected) == 2
+        for step, other in zip(mine, expected, strict=True):
+            assert step.compressed_m3 == pytest.approx(other.compressed_m3, rel=1e-9)
+            assert step.rim_m3 == pytest.approx(other.rim_m3, rel=1e-9)
+        inner = Window(round(x / CELL) - 40, -40, 80, 80)
+        found, wanted = (recompose(prints, cell_size=CELL).read(inner) for prints in (mine, expected))
+        assert np.abs(found - wanted).max() < 2e-9
+    levels = ground.weathering.levels(SECOND[0], np.array([-1.0, 1.0, 7.0]), np.zeros(3))
+    assert levels[0] == alone[0].weathering.level(SECOND[0])
+    assert levels[1] == levels[2] == 0.0, "steps tread new snow down to sand, and to a hard floor"
+
+
+def test_a_region_of_one_kind_is_the_ground_under_weather_bit_for_bit():
+    weather = replace(between(snowfall=2e-5, temperature=-3.0, wind=8.0, time_scale=300.0), surface="snow")
+    ground, (alone, _) = side_by_side(weather)
+    regions = Regions(HALVES[:1], replace(ground.regions.where, values=np.zeros_like(ground.regions.where.values)))
+    single = replace(ground, regions=regions, weathering=weathering_of(weather, LAYER, regions))
+    for step, other in zip(twice_in_each(single), twice_in_each(alone), strict=True):
+        assert step.compressed_m3 == other.compressed_m3
+        assert np.array_equal(step.tile(step.compression), other.tile(other.compression))
+        assert np.array_equal(step.tile(step.rim), other.tile(other.rim))
