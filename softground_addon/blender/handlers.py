@@ -1,4 +1,5 @@
-"""Handlers of Blender's events. Each returns at once unless something is armed."""
+"""Handlers of Blender's events. Each returns at once unless something is armed, as `state` tells: what it needs then is
+not even loaded before."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import reuse, session, settings, translation, tread_images
+from . import session, settings, translation
 from .baking import bake_report
 from .carried import marks_object
 from .compat import remove_scene
@@ -22,6 +23,7 @@ from .panels.outdated import compare_bake
 from .plants import trampling_table
 from .reading import analysis
 from .sampling.sampling_scene import IS_TEMPORARY
+from .state import state
 from .viewport import overlay
 from .weather import weather_keys
 
@@ -38,16 +40,17 @@ SETTLED = 0.3
 @persistent
 def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
     """Live mode shows the ground of the frame."""
-    if live.is_on():
+    if state.live is not None:
         live.follow(scene, depsgraph)
 
 
 @persistent
 def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     """An edited animation or mesh makes what was read from it worthless, and may leave a bake outdated."""
-    live.watch()
+    if state.live is not None:
+        live.watch()
     if depsgraph is not None and depsgraph.id_type_updated("IMAGE"):
-        tread_images.forget()
+        state.tread_maps.clear()
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
@@ -57,7 +60,7 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
             for copy in [update.id.original for update in depsgraph.updates if update.is_updated_geometry]:
                 if isinstance(copy, bpy.types.Object):
                     weather_keys.follow(copy)
-    if analysis.is_empty() or depsgraph is None:
+    if not state.analyses or depsgraph is None:
         return
     if any(depsgraph.id_type_updated(kind) for kind in EDITED):
         analysis.forget()
@@ -65,13 +68,14 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
             _later(overlay.read_again)
     elif bpy.app.background:  # where a timer that waits would keep the bpy module from ending
         return
-    elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
+    elif depsgraph.id_type_updated("MESH") and state.live is None:  # which writes a mesh at each frame
         _later(compare_prediction)
 
 
 def _follow_deletion(scene: Any) -> None:
-    bake_report.forget_deleted(scene.softground)
-    for ground in settings.listed_grounds(scene.softground) if not live.is_on() else ():
+    if scene.softground.printed:
+        bake_report.forget_deleted(scene.softground)
+    for ground in settings.listed_grounds(scene.softground) if state.live is None else ():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
             belongs.follow(ground, is_deleted=is_deleted)
@@ -101,7 +105,8 @@ def _later(job: Callable[[], float | None]) -> None:
 @persistent
 def begin_render(scene: Any = None, *_: Any) -> None:
     """Live mode stands still during renders, and weather has all keys."""
-    live.rendering(True)
+    if state.live is not None:
+        live.rendering(True)
     if scene is not None:
         _follow_weather_keys(scene)
 
@@ -109,7 +114,8 @@ def begin_render(scene: Any = None, *_: Any) -> None:
 @persistent
 def end_render(*_: Any) -> None:
     """Live mode may go on."""
-    live.rendering(False)
+    if state.live is not None:
+        live.rendering(False)
 
 
 @persistent
@@ -122,9 +128,11 @@ def before_undo(*_: Any) -> None:
 def after_undo(*_: Any) -> None:
     """Live mode shows its ground on what the undo brought back."""
     _remove_left_over_scenes()
-    tread_images.forget()
-    analysis.look_again()
-    live.after_undo()
+    state.tread_maps.clear()
+    if state.analyses:
+        analysis.look_again()
+    if state.live is not None:
+        live.after_undo()
     _follow_deletion(bpy.context.scene)
     _follow_weather_keys(bpy.context.scene)
 
@@ -133,13 +141,15 @@ def after_undo(*_: Any) -> None:
 def before_load(*_: Any) -> None:
     """End with the file whatever goes on."""
     modal_job.stop()
-    try:
-        live.discard()
-    except InputError:  # with one in Edit Mode all keep their prints, for Clear Bake
-        live.forget()
-    analysis.forget()
-    tread_images.forget()
-    reuse.forget()
+    if state.live is not None or state.live_ended:
+        try:
+            live.discard()
+        except InputError:  # with one in Edit Mode all keep their prints, for Clear Bake
+            live.forget()
+    state.analyses.clear()
+    state.depths.clear()
+    state.tread_maps.clear()
+    state.results.clear()
 
 
 @persistent
@@ -148,7 +158,9 @@ def after_load(*_: Any) -> None:
     _remove_left_over_scenes()
     translation.watch()
     _renew_tables()
-    if not bpy.app.background:
+    if not bpy.app.background and (
+        session.current().stale or any(scene.softground.ground for scene in bpy.data.scenes)
+    ):
         _later(compare_bake)
 
 

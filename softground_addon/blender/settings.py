@@ -7,18 +7,16 @@ from typing import Any, cast
 
 import bpy
 
-from ..core.composers.relief_plan import IMAGE
+from ..core.composers import relief_plan
 from ..core.errors import InputError
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
-from ..core.response.foot_holds import FootHold
+from ..core.response import foot_holds, response
 from ..core.response.performance import Performance
-from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.rig.mapping import SoleSource
 from ..core.rig.recording import SceneUnits
 from ..core.settings import DOWN, BakeSettings, CharacterSettings, GroundSettings, ObjectName, ResponseOptions
-from ..core.weather.felt_weather import FeltWeather
-from ..core.weather.weather import span_of
+from ..core.weather import felt_weather, weather
 from . import further_grounds, ground_slots, tread_images
 from .camera_views import camera_view
 from .state import state
@@ -218,7 +216,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         dense_shape_keys=options.dense_shape_keys,
         tread_m=typed(options.tread),
         tread_pattern=options.tread_pattern,
-        tread_image=tread_images.map_of(options.tread_image) if options.tread_pattern == IMAGE else "",
+        tread_image=tread_images.map_of(options.tread_image) if options.tread_pattern == relief_plan.IMAGE else "",
         relief=options.relief,
         relief_vertices=options.relief_vertices,
         relief_strength=typed(options.relief_strength),
@@ -238,12 +236,12 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     )
 
 
-def _calm(options: Any, surface: str, units: SceneUnits) -> FeltWeather:
+def _calm(options: Any, surface: str, units: SceneUnits) -> felt_weather.FeltWeather:
     """No weather, for steps that would feel it."""
     stretch = units.time_stretch
-    span = span_of(options.frame_start * stretch, options.frame_end * stretch)
+    span = weather.span_of(options.frame_start * stretch, options.frame_end * stretch)
     first, last = span.first / stretch, span.last / stretch
-    return FeltWeather(surface=surface, first=first, last=last, frame_rate=units.frame_rate)
+    return felt_weather.FeltWeather(surface=surface, first=first, last=last, frame_rate=units.frame_rate)
 
 
 def is_prop(character: Any) -> bool:
@@ -288,7 +286,7 @@ def character_of(character: Any) -> CharacterSettings:
         joints={entry.name: (bone, entry.end.lower()) for entry in character.joints if (bone := entry.bone)},
         soles=soles,
         holds=tuple(
-            FootHold(
+            foot_holds.FootHold(
                 hold.foot, float(hold.frame), hold.mode, typed(hold.strength), float(hold.ease_in), float(hold.ease_out)
             )
             for hold in character.holds
@@ -309,8 +307,8 @@ def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
     gains = TiltGains(typed(tilt.frequency), typed(tilt.damping))
     acted = Performance(**{part: typed(getattr(grounding, part)) for part in PERFORMANCE})
     return ResponseOptions(
-        TiltOptions(gains, typed(tilt.strength), typed(tilt.lateral)) if tilted else None,
-        GroundingOptions(typed(grounding.align), typed(grounding.lock), acted) if grounded else None,
+        response.TiltOptions(gains, typed(tilt.strength), typed(tilt.lateral)) if tilted else None,
+        response.GroundingOptions(typed(grounding.align), typed(grounding.lock), acted) if grounded else None,
     )
 
 

@@ -15,14 +15,14 @@ from typing import Any
 from .ground.camera_view import CameraView
 from .ground.material import UNSAID, GroundMaterial, Pressure
 from .ground.regions import GroundKind, numbered
+from .loads import estimate
 from .loads.cell_limits import Fineness
-from .loads.estimate import ForceModel
 from .motion.ground_frame import rows
-from .response.foot_holds import FootHold
-from .response.response import GroundingOptions, TiltOptions
+from .response import foot_holds
+from .response import response as responses
 from .rig.mapping import SoleSource
 from .rig.recording import SceneUnits
-from .weather.felt_weather import FeltWeather
+from .weather import felt_weather
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -87,10 +87,10 @@ class CharacterSettings:
     mass_kg: float = field(metadata=_on(Acts.LOADS))
     skin_mass_kg: float
     size_m: float
-    force_model: ForceModel = field(metadata=_on(Acts.LOADS))
+    force_model: estimate.ForceModel = field(metadata=_on(Acts.LOADS))
     joints: Mapping[str, tuple[str, str]]
     soles: tuple[SoleSource, ...]
-    holds: tuple[FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
+    holds: tuple[foot_holds.FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     body: ObjectName | None = field(default=None, metadata={"said_if_on": True})
     dirty_soles: float = field(default=0.0, metadata={"said_if_on": True, **_on(Acts.RESPONDING)})
     added_as: str = field(default="", metadata={"said_if_on": True, **_on(Acts.OUTPUT)})
@@ -144,7 +144,7 @@ class GroundSettings:
     surface: str = field(metadata=_on(Acts.OUTPUT))
     material: GroundMaterial = field(metadata=_on(Acts.PRESSING))
     painted: tuple[str, str, str]
-    weather: FeltWeather | None = field(metadata=_on(Acts.PRESSING))
+    weather: felt_weather.FeltWeather | None = field(metadata=_on(Acts.PRESSING))
     regions: tuple[RegionSettings, ...]
     under: str = field(metadata=_on(Acts.WRITING))
 
@@ -153,8 +153,8 @@ class GroundSettings:
 class ResponseOptions:
     """Responses that are asked of the characters; None where something is off."""
 
-    tilt: TiltOptions | None
-    grounding: GroundingOptions | None
+    tilt: responses.TiltOptions | None
+    grounding: responses.GroundingOptions | None
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ class BakeSettings(SceneUnits):
     longest_bake_s: float = field(metadata=_on(Acts.OUTPUT))
     debris: bool = field(default=False, metadata=_on(Acts.RESPONDING))
     shoe_treads: tuple[tuple[str, str, str], ...] = field(default=(), metadata=_on(Acts.OUTPUT))
-    weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
+    weather: felt_weather.FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
     camera: CameraView | None = field(default=None, metadata=_on(Acts.OUTPUT))
     hard_grounds: tuple[ObjectName, ...] = field(default=(), metadata=UNSAID)
     wet_grounds: tuple[str, ...] = field(default=(), metadata={**UNSAID, **_on(Acts.RESPONDING)})

@@ -15,16 +15,15 @@ from typing import Any, TextIO
 
 import bpy
 
-from ...batch import command, receipts
-from ...batch.manifest import BatchShot
+from ...batch import command, manifest, receipts
 from ...core.errors import BakeError, InputError, SoftGroundError
 from ...core.files import files, report
 from ...core.ground import presets
+from ...core.record import edits as step_edits
 from ...core.record.archive import LARGEST_TEXT
-from ...core.record.edits import StepEdit, from_json
 from .. import further_grounds, ground_presets, jobs, setting_paths, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
-from ..characters.selection import set_up_automatically
+from ..characters import selection
 from ..output import export_formats
 from ..preset_files import user_folder
 from ..remedies import said
@@ -148,7 +147,7 @@ def _bake(options: argparse.Namespace) -> None:
     target = save_target(options)
     check_places(options, target)
     edits = _edits(options.edits) if options.edits else None
-    set_up_automatically(scene)
+    selection.set_up_automatically(scene)
     if options.preset:
         ground_presets.apply_preset(scene.softground, _preset(options.preset))
     _choose_grounds(scene, options.grounds)
@@ -182,7 +181,7 @@ def _clean(options: argparse.Namespace) -> None:
     scene = _scene(options.scene)
     target = save_target(options)
     check_places(options, target)
-    set_up_automatically(scene)
+    selection.set_up_automatically(scene)
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
     travels = jobs.run(root_motion.root_motion(scene)) if options.root_motion else ()
@@ -280,7 +279,7 @@ def _scene(name: str | None) -> bpy.types.Scene:
     return scene
 
 
-def _edits(path: Path) -> dict[str, StepEdit]:
+def _edits(path: Path) -> dict[str, step_edits.StepEdit]:
     """The edits of steps in a file.
 
     Raises
@@ -294,7 +293,7 @@ def _edits(path: Path) -> dict[str, StepEdit]:
         raise InputError(f"The edits '{path}' cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"The edits '{path}' are not valid JSON: {error}.") from None
-    return from_json(content, f"The edits '{path}'")
+    return step_edits.from_json(content, f"The edits '{path}'")
 
 
 def _choose_grounds(scene: bpy.types.Scene, texts: Sequence[str]) -> None:
@@ -323,9 +322,9 @@ def _preset(name_or_path: str) -> presets.Preset:
     )
 
 
-def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
+def _batch_shot(options: argparse.Namespace, target: Path | None) -> manifest.BatchShot:
     """This bake as an entry of a manifest."""
-    return BatchShot(
+    return manifest.BatchShot(
         name="",
         file=Path(bpy.data.filepath),
         scene=options.scene or "",

@@ -12,14 +12,14 @@ import bpy
 
 from ...core.ground.surfaces import SURFACES
 from ..ground_slots import HARD, MARK, OVER, surface_of, theirs
-from ..materials.materials import ensure_material, ensure_over
-from .baked_ground import display_mesh_of
+from ..materials import materials
+from . import baked_ground
 
 
 def follow(options: Any) -> None:
     """Show the scene's surface on its ground wherever the add-on's own material is."""
     ground = options.ground
-    for obj in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
+    for obj in dict.fromkeys((ground, baked_ground.display_mesh_of(ground))) if ground else ():
         _show(obj, options.material.surface, over_theirs=False)
 
 
@@ -32,9 +32,9 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     int
         Number of the user's materials that it is mixed over.
     """
-    obj = display_mesh_of(ground)
+    obj = baked_ground.display_mesh_of(ground)
     if not obj.material_slots:
-        obj.data.materials.append(ensure_material(surface))
+        obj.data.materials.append(materials.ensure_material(surface))
     _show(obj, surface, over_theirs=True)
     return count_over_theirs(obj)
 
@@ -63,13 +63,13 @@ def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
             look = surface_of(now) or surface
         if now is None:
             if over_theirs:
-                slot.material = ensure_material(look)
+                slot.material = materials.ensure_material(look)
         elif mixed_over := now.get(OVER):
-            _replace(slot, ensure_over(mixed_over, look))
+            _replace(slot, materials.ensure_over(mixed_over, look))
         elif now.get(MARK) in SURFACES:
-            slot.material = ensure_material(look)
+            slot.material = materials.ensure_material(look)
         elif over_theirs and now.get(MARK) is None:
-            slot.material = ensure_over(now, look)
+            slot.material = materials.ensure_over(now, look)
 
 
 def _writable_slots(obj: bpy.types.Object) -> Iterator[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from mathutils import Vector
 
 from ...core.capture import amass, c3d, trc
-from ...core.capture.captured import Capture, Plate
+from ...core.capture.captured import Plate
 from ...core.capture.joint_centres import UPWARD, CapturedBody, captured_body
 from ...core.capture.skeleton import Skeleton, skeleton_of
 from ...core.errors import InputError
@@ -27,8 +26,8 @@ from ..translation import translated
 LARGEST = 2**29
 """Size of a file that is read [bytes]."""
 
-MARKERS: dict[str, Callable[[bytes], Capture]] = {".c3d": c3d.read, ".trc": trc.read}
-"""Readers of files of markers by their suffix."""
+MARKERS: dict[str, Any] = {".c3d": c3d, ".trc": trc}
+"""Modules that read files of markers, by their suffix."""
 
 
 def read_body(path: Path, up: str | None = None) -> CapturedBody:
@@ -48,7 +47,7 @@ def read_body(path: Path, up: str | None = None) -> CapturedBody:
         content = files.read_regular(path, LARGEST)
     except OSError as error:
         raise InputError(f"'{path.name}' cannot be read ({error.strerror}): choose another file") from error
-    return amass.read(content) if suffix == ".npz" else captured_body(MARKERS[suffix](content), up)
+    return amass.read(content) if suffix == ".npz" else captured_body(MARKERS[suffix].read(content), up)
 
 
 def new_rig(context: bpy.types.Context, name: str, skeleton: Skeleton, frames: Array, unit: float) -> bpy.types.Object:

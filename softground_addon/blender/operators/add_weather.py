@@ -9,7 +9,7 @@ from ...core.errors import InputError
 from .. import jobs, session, settings
 from ..ground import baked_ground, ground_checks
 from ..operator_base import OnBake, reports_errors
-from ..playback import weather_modifier
+from ..playback import weather_inputs, weather_modifier
 from ..translation import translated
 from ..weather import ground_weather as weather
 from ..weather import weather_result
@@ -18,7 +18,7 @@ from .modal_job import Reading, Reports
 NONE = "NONE"
 _CHOICES = [
     (NONE, "None", "A shot of eight hours: set the sliders. Weather that is there already keeps its values"),
-    *((key, title, f"Set the sliders to {title}") for key, (title, _) in weather.PRESETS.items()),
+    *((key, title, f"Set the sliders to {title}") for key, (title, _) in weather_inputs.PRESETS.items()),
 ]
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import bpy
 
-from ...core.composers.responses import NOTICEABLE_GAP_MM
+from ...core.composers import responses
 from .. import session, settings
 from ..baking import bake_report
-from ..characters.character_setup import title_of
+from ..characters import character_setup
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
 from ..translation import translated
@@ -49,7 +49,7 @@ def _warnings(layout: Any, warnings: Sequence[str]) -> None:
 def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     """Height of the feet above the prints that they made, and a button that lets them down."""
     floating = summary.get(bake_report.FLOATING, 0.0)
-    if floating < NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
+    if floating < responses.NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
         return
     box = layout.box().column(align=True)
     box.label(text=translated("Feet float up to {gap} mm", gap=f"{floating:.0f}"), icon="INFO", translate=False)
@@ -124,11 +124,13 @@ def draw_remedies(
     above = active_character(options) if in_panel else None
     layout.operator_context = "INVOKE_DEFAULT"  # which is another one in a popup
     for character in options.characters:
-        name = f"'{title_of(character)}'"
+        name = f"'{character_setup.title_of(character)}'"
         text = "" if name in changed else "\n".join(warning for warning in warnings if name in warning)
         for words, operator in _OF_CHARACTER.items():
             if match := re.search(words, text):
-                layout.operator(operator, text=_button(match), translate=False).character = title_of(character)
+                layout.operator(operator, text=_button(match), translate=False).character = character_setup.title_of(
+                    character
+                )
         if "Set Mass" in text and character != above:
             layout.prop(character, "mass")
     text = "\n".join(warnings)

@@ -10,11 +10,10 @@ from bpy.props import StringProperty
 
 from ...core.errors import InputError
 from .. import jobs, settings
-from ..characters import character_setup, contact_editing
-from ..characters.import_fixes import mass_of, walk_ahead
+from ..characters import character_setup, contact_editing, import_fixes
 from ..operator_base import reports_errors
 from ..reading import analysis
-from ..rigs.frame_ranges import ancestors
+from ..rigs import frame_ranges
 from ..translation import translated
 from .modal_job import Reading, Reports
 from .panel_base import RemovesChosen, chosen_of
@@ -77,7 +76,7 @@ MUCH = 2.0
 
 def suggested_mass(character: Any) -> float:
     """Mass that a character's skin or its height suggests where its own differs much [kg], 0 where it does not."""
-    likely = mass_of(character)
+    likely = import_fixes.mass_of(character)
     differs = likely > 0 and not likely / MUCH < character.mass < likely * MUCH
     return likely if differs else 0.0
 
@@ -95,7 +94,7 @@ class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
         character = active_character(settings.options_of(context))
         if not character.skin_mass > 0:
             raise InputError(f"'{character_setup.title_of(character)}' has no skin to go by: type its mass.")
-        character.mass = mass_of(character)
+        character.mass = import_fixes.mass_of(character)
         return {"FINISHED"}
 
 
@@ -141,7 +140,7 @@ class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
         belt = known.belts.get(name)
         if belt is None or rig is None:
             raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
-        walk_ahead(scene, settings.resolve(rig), -belt)
+        import_fixes.walk_ahead(scene, settings.resolve(rig), -belt)
         return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
@@ -185,7 +184,10 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
         else:
             characters = scene.softground.characters
             props = [obj for obj in context.selected_objects if all(obj != item.armature for item in characters)]
-            wearer = next((item for item in characters if any(item.armature in ancestors(obj) for obj in props)), None)
+            wearer = next(
+                (item for item in characters if any(item.armature in frame_ranges.ancestors(obj) for obj in props)),
+                None,
+            )
             character = wearer or active_character(scene.softground)
             added = contact_editing.add_object_contacts(scene.softground, character, props)
         name = character_setup.title_of(character)

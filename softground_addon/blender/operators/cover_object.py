@@ -7,7 +7,7 @@ import numpy as np
 from bpy.props import FloatProperty
 
 from ...core.errors import InputError
-from ...core.meshing.cover import Cover, cover
+from ...core.meshing import cover as covers
 from .. import further_grounds, mesh_arrays, settings
 from ..drafts import none_left_if_it_fails
 from ..ground import created_ground, ground_checks, ground_surface
@@ -17,7 +17,7 @@ from ..properties import SoftGroundPainted
 from ..reading import analysis
 from ..remedies import said
 from ..translation import translated
-from .shot_setup import selected_ground
+from . import shot_setup
 
 SPACING = 0.04
 """Largest distance of a cover's vertices [m]; the trail is refined as on any coarse ground."""
@@ -44,11 +44,11 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if a mesh is selected that may be covered."""
         cls.poll_message_set(translated("Select the mesh to cover, in Object Mode"))
-        return context.mode == "OBJECT" and selected_ground(context) is not None
+        return context.mode == "OBJECT" and shot_setup.selected_ground(context) is not None
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, obj = settings.scene_of(context), selected_ground(context)
+        scene, obj = settings.scene_of(context), shot_setup.selected_ground(context)
         assert obj is not None
         if fault := ground_checks.hard_fault(obj):
             what = fault.partition(":")[0].replace(" in Hard Ground", "")
@@ -58,7 +58,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
         units = units_about(scene, obj, bodies)
         surface = ground_surface.undisturbed_surface(obj, units.unit_scale_m, frame=units.frame)
         try:
-            laid = cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
+            laid = covers.cover(surface.surface_vertices, surface.triangles, thickness, SPACING)
         except InputError as error:
             raise InputError(f"'{obj.name}' cannot be covered. {said(error)}") from None
         first = options.ground if settings.exists(options.ground) and options.ground != obj else None
@@ -84,7 +84,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
 
 
 @none_left_if_it_fails()
-def _object_of(laid: Cover, name: str, unit: float, thickness: float) -> bpy.types.Object:
+def _object_of(laid: covers.Cover, name: str, unit: float, thickness: float) -> bpy.types.Object:
     """A cover as an object that is in no scene yet; its layer is painted as deep as it is."""
     depth = SoftGroundPainted.bl_rna.properties["layer_depth"].default
     mesh = mesh_arrays.points(name, laid.vertices / unit, [(depth, "FLOAT", laid.thickness / thickness)])

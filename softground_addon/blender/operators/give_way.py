@@ -9,14 +9,22 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core.errors import InputError
-from ...core.plants.tramplings import tramplings
+from ...core.plants import tramplings as plant_tramplings
+from ...core.plants.bending import PLANTS
 from .. import jobs, mesh_arrays, settings
 from ..ground import baked_ground, ground_checks, ground_mesh, ground_surface, trampled_ground
 from ..placement import hang_on
 from ..plants import give_way, give_way_nodes, meadow, trampling_table
 from ..translation import translated
-from ..weather.ground_weather import damage_named
+from ..weather import ground_weather
 from .modal_job import Reading, Reports
+
+KINDS = (
+    *((key, title, f"Plants that bend and rise like {title.lower()}") for key, (title, _) in PLANTS.items()),
+    ("LITTER", "Leaves and Twigs", "What lies on the ground, is pressed in, tilts with the prints, and is thrown"),
+    ("PEBBLES", "Pebbles", "As leaves and twigs; on hard ground they roll aside"),
+)
+"""What gives way, as an enum has it."""
 
 
 class SOFTGROUND_OT_give_way(Reading):
@@ -26,7 +34,7 @@ class SOFTGROUND_OT_give_way(Reading):
     bl_idname = "softground.give_way"
     bl_label = "Give Way"
 
-    kind: EnumProperty(name="Kind", description="What gives way", items=give_way.KINDS, default="MEADOW")
+    kind: EnumProperty(name="Kind", description="What gives way", items=KINDS, default="MEADOW")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -72,10 +80,11 @@ def renew_table(ground: bpy.types.Object) -> None:
     if trampling_table.is_current(ground) or not baked_ground.is_baked(ground):
         return
     record = baked_ground.record_of(ground)
-    with damage_named(ground):
+    with ground_weather.damage_named(ground):
         units = baked_ground.units_of(record.about["inputs"])
     trampling_table.ensure(ground)
-    trampled_ground.write(ground, tramplings([*record.shaping, *record.on_floors]), units)
+    made = plant_tramplings.tramplings([*record.shaping, *record.on_floors])
+    trampled_ground.write(ground, made, units)
 
 
 def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:

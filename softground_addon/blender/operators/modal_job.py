@@ -12,7 +12,7 @@ import bpy
 from ...core.errors import InputError, SoftGroundError
 from ...core.settings import ObjectName
 from .. import jobs, session, settings
-from ..characters.character_setup import characters_of
+from ..characters import character_setup
 from ..operator_base import OnShot, reports_errors
 from ..remedies import said
 from ..state import state
@@ -307,7 +307,7 @@ def why_no_start(context: bpy.types.Context) -> str:
         return BUSY
     if session.is_rendering():
         return "A render is running: wait until it has ended"
-    if not characters_of(settings.options_of(context)):
+    if not character_setup.characters_of(settings.options_of(context)):
         return "Add a character first: select its armature and press Add Character"
     return ""
 

@@ -14,17 +14,16 @@ from typing import Any
 import bpy
 from bpy.props import FloatProperty
 
-from ...core.composers.prediction import matching_modulus, next_modulus
+from ...core.composers import prediction
 from ...core.errors import InputError
 from ...core.loads.cell_limits import Fineness
-from ...core.motion.motion import shortest_sole
+from ...core.motion import motion
 from ...core.settings import BakeSettings
 from ...core.soles.deep_ground import wading
 from .. import jobs, session, settings
 from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
-from ..reading.analysis import Analysis
 from ..remedies import said
 from ..state import state
 from ..translation import translated
@@ -65,7 +64,7 @@ class DepthPrediction:
         True if nothing has changed since.
     """
 
-    analysis: Analysis
+    analysis: analysis.Analysis
     depth: float | None
     is_current: bool
 
@@ -82,7 +81,7 @@ def asked(scene: bpy.types.Scene) -> BakeSettings:
 
 def fineness(wanted: BakeSettings, predicted: DepthPrediction) -> Fineness:
     """Fineness of the bake to come, with what legs will carve at the depth to expect."""
-    length = shortest_sole([character.motion for character in predicted.analysis.loads])
+    length = motion.shortest_sole([character.motion for character in predicted.analysis.loads])
     return replace(wanted.fineness, is_carved=wanted.carves and bool(wading(predicted.depth or 0.0, length) > 0))
 
 
@@ -104,7 +103,7 @@ def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]
     return seen
 
 
-def _prediction(uid: int, known: Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
+def _prediction(uid: int, known: analysis.Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
     """The prediction for the scene of a session uid, by what is known of its shot."""
     if known is None:
         return None
@@ -136,7 +135,7 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
             return
         wanted = settings.snapshot(scene)
         if bpy.app.background or depth / 100 > wanted.material.deepest or not state.shown_depths.get(scene.session_uid):
-            modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
+            modulus = prediction.matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
             scene.softground.material.youngs_modulus = modulus
         else:
             aim_at(scene, depth / 100)
@@ -154,7 +153,7 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     """
     material = scene.softground.material
     law = settings.snapshot(scene).material
-    material.youngs_modulus = next_modulus(
+    material.youngs_modulus = prediction.next_modulus(
         [(material.youngs_modulus, state.shown_depths[scene.session_uid])], depth, law
     )
     state.shown_depths[scene.session_uid] = depth
@@ -168,7 +167,7 @@ def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
     if aim is None or known is None or material.youngs_modulus != aim.modulus:
         return
     wanted = settings.snapshot(scene)
-    search = matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)
+    search = prediction.matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)
     with suppress(InputError):  # the stiffness that comes nearest stays
         modulus = yield from jobs.meanwhile(jobs.Progress("sample", 0.0), search)
         if scene.softground.material.youngs_modulus == aim.modulus:

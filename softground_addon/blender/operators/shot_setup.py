@@ -12,22 +12,19 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...batch.manifest import BatchShot
+from ...batch import manifest
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from ...core.ground import surfaces
 from .. import further_grounds, ground_presets, jobs, settings
-from ..baking.scene_findings import shape_findings
+from ..baking import scene_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
 from ..operator_base import OnGround, reports_errors
 from ..reading import analysis, shots
-from ..rigs import frame_ranges
-from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
-from ..sampling.body_sampling import deforms
-from ..sampling.rig_checks import is_animated
-from ..sampling.skin_sampling import meshes_on
+from ..rigs import frame_ranges, rig_mapping
+from ..sampling import body_sampling, rig_checks, skin_sampling
 from ..translation import translated
 from .character_editing import active_character
 from .modal_job import Reading, Reports
@@ -85,7 +82,7 @@ def _add(
     rigs, props = selection.chosen(scene, active, selected)
     reports: Reports = []
     remaining = [settings.name_of(prop) for prop in props]
-    for name in [settings.name_of(obj) for obj in (*rigs, *filter(deforms, props))]:
+    for name in [settings.name_of(obj) for obj in (*rigs, *filter(body_sampling.deforms, props))]:
         is_rig = name not in remaining
         adding = character_setup.adding_character if is_rig else character_setup.adding_body
         character = yield from adding(scene, settings.resolve(name))
@@ -95,18 +92,18 @@ def _add(
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", translated("Added '{name}' with {soles}", name=character.name, soles=soles)))
-        elif is_animated(character.armature) and meshes_on(scene.objects, character.armature):
+        elif rig_checks.is_animated(character.armature) and skin_sampling.meshes_on(scene.objects, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
-            reports.append(("WARNING", f"Added '{character.name}', but {what}, {CHOOSE_CONTACTS}"))
+            reports.append(("WARNING", f"Added '{character.name}', but {what}, {rig_mapping.CHOOSE_CONTACTS}"))
         else:
-            reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
+            reports.append(("WARNING", f"Added '{character.name}', but found no feet: {rig_mapping.CHOOSE_CONTACTS}"))
     props = [settings.resolve(prop) for prop in remaining]
     added = prop_setup.add_props(scene, props) if props else []
     if added:
         each = [translated("'{name}' of {mass} kg", name=entry.name, mass=f"{entry.mass:g}") for entry in added]
         reports.append(("INFO", translated("Added {props}", props=", ".join(each))))
     for obj in props:
-        if changing := shape_findings([obj]):
+        if changing := scene_findings.shape_findings([obj]):
             reports.append(("WARNING", changing[0].text))
         elif not selection.moves(obj):
             text = translated("'{name}' does not move: give it keys or a rigid body before you bake", name=obj.name)
@@ -198,7 +195,7 @@ class SOFTGROUND_OT_create_ground(Reading):
 def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active object if it is a selected instance of a collection with meshes."""
     obj = context.active_object
-    return obj if obj is not None and obj.select_get() and instances_mesh(obj) else None
+    return obj if obj is not None and obj.select_get() and rig_mapping.instances_mesh(obj) else None
 
 
 def _check_no_instance(context: bpy.types.Context) -> None:
@@ -348,7 +345,7 @@ def bake_command(scene: bpy.types.Scene) -> str:
         If a name in it cannot be typed.
     """
     shot = Path(bpy.data.filepath)
-    bake = BatchShot(
+    bake = manifest.BatchShot(
         name=shot.stem,
         file=shot,
         scene=scene.name if len(bpy.data.scenes) > 1 else "",

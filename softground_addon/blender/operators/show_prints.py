@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground, baked_steps, ground_mesh
-from ..ground.baked_steps import BakedStep
 from ..operator_base import OnBake
 from ..placement import in_scene
 from ..state import state
@@ -58,7 +57,7 @@ def is_free(area: Any) -> bool:
     return bool(space and space.region_3d.view_perspective == "PERSP" and not space.local_view)
 
 
-def centre(area: Any, step: BakedStep) -> None:
+def centre(area: Any, step: baked_steps.BakedStep) -> None:
     """Move the middle of the view in an area to a step; the view through a camera stays."""
     space = _viewport(area)
     if space and space.region_3d.view_perspective != "CAMERA":
@@ -79,7 +78,7 @@ def _viewport(area: Any) -> Any:
     return None if space.region_quadviews or space.region_3d.lock_rotation else space
 
 
-def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[BakedStep]:
+def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[baked_steps.BakedStep]:
     """The last step that is in the ground at a frame, and those next to it."""
     visible = [step for step in baked_steps.of(ground) if step.footprint and step.there_from <= frame]
     if not visible:
@@ -89,11 +88,11 @@ def _last_prints(ground: bpy.types.Object | None, frame: int) -> list[BakedStep]
     return sorted(visible, key=lambda step: float(np.linalg.norm(_middle(step) - at)))[:SHOWN]
 
 
-def _middle(step: BakedStep) -> NDArray[np.float64]:
+def _middle(step: baked_steps.BakedStep) -> NDArray[np.float64]:
     return step.outline().mean(axis=0)
 
 
-def _show(prints: Sequence[BakedStep], area: Any, unit_scale: float) -> None:
+def _show(prints: Sequence[baked_steps.BakedStep], area: Any, unit_scale: float) -> None:
     """Frame prints in an area, if there are any, and light them; `unit_scale` is that of their scene [m]."""
     space = area.spaces.active
     if not prints:

@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...core.events.events import Event, in_order, label
-from ...core.events.phases import KINDS
+from ...core.events import events
+from ...core.events import phases as event_phases
 from .. import mesh_arrays, settings
-from ..baking.bake_report import HeardBake, heard_bakes
+from ..baking import bake_report
 from ..ground import baked_ground
 from ..operator_base import OnBake, reports_errors
 from ..translation import translated
@@ -29,7 +29,7 @@ MARKED = {"heel_strike", "land", "toe_off"}
 """Phases that get a marker unless the user chooses others."""
 
 
-def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Object:
+def add_points(scene: bpy.types.Scene, table: Sequence[events.Event]) -> bpy.types.Object:
     """An object whose points are the events, in place of the one that there may be.
 
     Texts become numbers: `phase` in the order of `core.events.phases.KINDS`, `character` and `contact` in the order
@@ -37,7 +37,7 @@ def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Obje
     """
     place = np.array([row["position"] for row in table], float).reshape(-1, 3) / scene.unit_settings.scale_length
     texts = {name: list(dict.fromkeys(row[name] for row in table)) for name in ("character", "contact")}
-    texts["phase"] = list(KINDS)
+    texts["phase"] = list(event_phases.KINDS)
     columns = (
         *((name, "FLOAT", np.array([row[name] for row in table])) for name in _NUMBERS),
         ("normal_of_ground", "FLOAT_VECTOR", np.array([row["normal"] for row in table])),
@@ -49,16 +49,16 @@ def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Obje
     return shown
 
 
-def add_markers(markers: Any, table: Sequence[Event], kinds: set[str]) -> int:
+def add_markers(markers: Any, table: Sequence[events.Event], kinds: set[str]) -> int:
     """Put the events of some phases into a timeline, in place of those of an earlier bake; returns their number."""
     ours = {f"{row['character']} {row['contact']} " for row in table}
-    endings = tuple(kind.replace("_", " ") for kind in KINDS)
+    endings = tuple(kind.replace("_", " ") for kind in event_phases.KINDS)
     for marker in list(markers):
         if marker.name.endswith(endings) and any(marker.name.startswith(prefix) for prefix in ours):
             markers.remove(marker)
     wanted = [row for row in table if row["phase"] in kinds]
     for row in wanted:
-        markers.new(label(row), frame=round(row["frame"]))
+        markers.new(events.label(row), frame=round(row["frame"]))
     return len(wanted)
 
 
@@ -76,10 +76,10 @@ def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
     return shown
 
 
-def events_of(bakes: Iterable[HeardBake]) -> list[Event]:
+def events_of(bakes: Iterable[bake_report.HeardBake]) -> list[events.Event]:
     """Events of some bakes, in the order of time; errors as of `baked_ground.events_of`."""
     tables = ((bake, baked_ground.events_of(bake.ground)) for bake in bakes)
-    return in_order(row for bake, table in tables for row in table if bake.has(row["character"], row["frame"]))
+    return events.in_order(row for bake, table in tables for row in table if bake.has(row["character"], row["frame"]))
 
 
 class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
@@ -91,7 +91,7 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = events_of(heard_bakes(settings.options_of(context)))
+        table = events_of(bake_report.heard_bakes(settings.options_of(context)))
         shown = add_points(settings.scene_of(context), table)
         self.report(
             {"INFO"}, translated("{count} events are the points of '{name}'", count=len(table), name=shown.name)
@@ -109,14 +109,14 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
     phases: EnumProperty(
         name="Events",
         description="Which events to mark",
-        items=[(kind, kind.replace("_", " ").title(), "") for kind in KINDS],
+        items=[(kind, kind.replace("_", " ").title(), "") for kind in event_phases.KINDS],
         options={"ENUM_FLAG"},
         default=MARKED,
     )
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = events_of(heard_bakes(settings.options_of(context)))
+        table = events_of(bake_report.heard_bakes(settings.options_of(context)))
         count = add_markers(settings.scene_of(context).timeline_markers, table, set(self.phases))
         self.report({"INFO"}, translated("Marked {count} events", count=count))
         return {"FINISHED"}

@@ -13,8 +13,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ...core.errors import InputError
-from ...core.events import event_files, event_midi
-from ...core.events.events import between
+from ...core.events import event_files, event_midi, events
 from ...core.files import files
 from .. import settings
 from ..baking import bake_report
@@ -81,11 +80,11 @@ def _images(ground: bpy.types.Object, options: Options) -> list[Path]:
     )
 
 
-def _moving(write: Callable[[bpy.types.Object, Path, int, int], None]) -> Writer:
-    """A writer of one file that holds all frames."""
+def _moving(of: Callable[[], Callable[[bpy.types.Object, Path, int, int], None]]) -> Writer:
+    """A writer of one file that holds all frames, by a function that is looked up as it is needed."""
 
     def writer(ground: bpy.types.Object, options: Options) -> list[Path]:
-        write(ground, options.path, options.start, options.end)
+        of()(ground, options.path, options.start, options.end)
         return [options.path]
 
     return writer
@@ -96,14 +95,14 @@ def _still(ground: bpy.types.Object, options: Options) -> list[Path]:
     return [options.path]
 
 
-def _events(dump: Callable[..., str | bytes], *, is_timed: bool = True) -> Writer:
+def _events(of: Callable[[], Callable[..., str | bytes]], *, is_timed: bool = True) -> Writer:
     """A writer of the events of some frames, their times counted from the first; `is_timed` needs the frame rate."""
 
     def writer(_ground: bpy.types.Object, options: Options) -> list[Path]:
         scene = settings.scene_of(bpy.context)
         rate, bakes = settings.frame_rate_of(scene), bake_report.heard_bakes(scene.softground)
-        table = between(event_points.events_of(bakes), options.start, options.end, rate)
-        content = dump(table, frame_rate=rate) if is_timed else dump(table)
+        table = events.between(event_points.events_of(bakes), options.start, options.end, rate)
+        content = of()(table, frame_rate=rate) if is_timed else of()(table)
         with files.replacing(options.path) as partial:
             partial.write_bytes(content.encode() if isinstance(content, str) else content)
         return [options.path]
@@ -158,15 +157,15 @@ class Format:
 _BUILT = bpy.app.build_options
 
 FORMATS = {
-    "ALEMBIC": Format(".abc", "Alembic", "The moving ground", _moving(exports.export_alembic), _BUILT.alembic),
+    "ALEMBIC": Format(".abc", "Alembic", "The moving ground", _moving(lambda: exports.export_alembic), _BUILT.alembic),
     "USD": Format(
-        ".usdc", "USD", "The moving ground with its shading attributes", _moving(exports.export_usd), _BUILT.usd
+        ".usdc", "USD", "The moving ground with its shading attributes", _moving(lambda: exports.export_usd), _BUILT.usd
     ),
     "PC2": Format(
         ".pc2",
         "Point Cache (PC2)",
         "Positions of the ground's vertices, for a mesh cache",
-        _moving(exports.export_point_cache),
+        _moving(lambda: exports.export_point_cache),
     ),
     "EXR": Format(
         ".exr",
@@ -182,31 +181,31 @@ FORMATS = {
         ".jsonl",
         "Events (JSON Lines)",
         "Heel strikes, toe-offs and slides, for game engines",
-        _events(event_files.json_lines),
+        _events(lambda: event_files.json_lines),
     ),
     "EVENTS_MIDI": Format(
         ".mid",
         "Events (MIDI)",
         "Each step as a note, for samplers and drum machines",
-        _events(event_midi.dump, is_timed=False),
+        _events(lambda: event_midi.dump, is_timed=False),
     ),
     "EVENTS_REAPER": Format(
         ".csv",
         "Events (Reaper)",
         "Regions and markers for Reaper",
-        _events(event_files.reaper, is_timed=False),
+        _events(lambda: event_files.reaper, is_timed=False),
     ),
     "EVENTS_EDL": Format(
         ".edl",
         "Events (Resolve)",
         "Timeline markers for DaVinci Resolve",
-        _events(event_files.edl),
+        _events(lambda: event_files.edl),
     ),
     "EVENTS_OTIO": Format(
         ".otio",
         "Events (OpenTimelineIO)",
         "Timeline markers for editors",
-        _events(event_files.otio),
+        _events(lambda: event_files.otio),
     ),
     "OPENSIM_MOT": Format(
         ".mot",

@@ -16,11 +16,11 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core.composers.relief_plan import relief_at
+from ...core.composers import relief_plan
 from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
-from ...core.playback.vertex_histories import vertex_histories
+from ...core.playback import vertex_histories as histories
 from .. import settings
 from ..carried import marks_object
 from ..debris import debris_object
@@ -49,8 +49,8 @@ def export_point_cache(ground: bpy.types.Object, path: Path, start: int, end: in
     world = ground_surface.rest_vertices(display_mesh, unit_scale, frame_of_bake)[moved]
     sigma = baked_ground.baked_with(about, "blur_sigma")
     x, y = world[:, :2].T
-    relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
-    over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
+    relief = relief_plan.relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
+    over_time = histories.vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
     up = ground_surface.up_of(display_mesh, unit_scale, frame_of_bake)
 
     def samples() -> Iterator[NDArray[np.float32]]:

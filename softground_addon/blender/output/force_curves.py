@@ -14,9 +14,9 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...core.errors import SoftGroundError
 from ...core.files import files
-from ...core.loads.deviation import force_deviation
-from ...core.loads.estimate import CharacterLoads
-from ...core.loads.free_moments import free_moments
+from ...core.loads import deviation as load_deviation
+from ...core.loads import estimate
+from ...core.loads import free_moments as foot_moments
 from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import compat, settings
@@ -62,13 +62,17 @@ Estimates = Mapping[tuple[str, str], Array]
 """Values of those columns at each frame by character and sole, (N, 8); NaN where there is none."""
 
 
-def estimates_of(loads: Sequence[CharacterLoads], frames: Array) -> Estimates:
+def estimates_of(loads: Sequence[estimate.CharacterLoads], frames: Array) -> Estimates:
     """Estimated values at scene frames. Only a body with joints has a deviation and free moments."""
     estimates: dict[tuple[str, str], Array] = {}
     for character in loads:
         touching, known = character.contacts.touching, character.motion.joints and character.motion.centre is None
         nothing = np.full(touching.shape, np.nan)
-        deviation, twist = (force_deviation(character), free_moments(character)) if known else (nothing, nothing)
+        deviation, twist = (
+            (load_deviation.force_deviation(character), foot_moments.free_moments(character))
+            if known
+            else (nothing, nothing)
+        )
         centre = np.where(touching[..., None], character.forces.centre_of_pressure, np.nan)
         columns = np.concatenate([deviation[..., None], character.forces.forces, centre, twist[..., None]], axis=-1)
         for number, sole in enumerate(character.motion.soles):

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ...core.composers.relief_plan import IMAGE
+from ...core.composers import relief_plan
 from ...core.loads.cell_limits import Coverage, Fineness, duration
 from .. import ground_slots, settings
 from ..carried import marks_object
@@ -51,7 +51,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
                 row.label(text=text, icon="INFO", translate=False)
         column.prop(options, "tread_mm")
         column.prop(options, "tread_pattern")
-        if options.tread_pattern == IMAGE:
+        if options.tread_pattern == relief_plan.IMAGE:
             column.template_ID(options, "tread_image", open="image.open")
         column.prop(options, "debris")
         if options.debris and options.ground is not None:

@@ -11,13 +11,11 @@ from typing import Any
 import bpy
 
 from ...core.ground.surfaces import SURFACES
-from ...core.motion.motion import JOINTS
+from ...core.motion import motion
 from ...core.motion.units import scale_to_metres, wrong_unit
 from .. import session, settings
 from ..baking import bake_report
-from ..characters import selection
-from ..characters.character_setup import title_of
-from ..characters.import_fixes import is_captured, sizes_of
+from ..characters import character_setup, import_fixes, selection
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
@@ -59,7 +57,7 @@ class SOFTGROUND_UL_joints(Listed):
 
     def filter_items(self, _context: Any, data: Any, name: Any) -> Any:
         """Sort them from the hips outward."""
-        place = {joint: number for number, joint in enumerate(JOINTS)}
+        place = {joint: number for number, joint in enumerate(motion.JOINTS)}
         joints = [place.get(joint.name, len(place)) for joint in getattr(data, name)]
         order = sorted(range(len(joints)), key=joints.__getitem__)
         return [], [order.index(number) for number in range(len(joints))]
@@ -101,8 +99,8 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
 
 def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     """What size a character has whose file is in other units, and a button that puts it right."""
-    size, _ = sizes_of(unit_scale, character)
-    captured = is_captured(character)
+    size, _ = import_fixes.sizes_of(unit_scale, character)
+    captured = import_fixes.is_captured(character)
     factor = scale_to_metres(size, captured=captured)
     if factor == 1.0:
         return
@@ -119,7 +117,7 @@ def _scale(layout: Any, unit_scale: float, character: Any) -> None:
 
 def _on_the_spot(layout: Any, predicted: prediction.DepthPrediction | None, character: Any) -> None:
     """That a character walks in place, and a button that lets it travel."""
-    title = title_of(character)
+    title = character_setup.title_of(character)
     if is_prop(character) or predicted is None or title not in predicted.analysis.belts:
         return
     box = layout.box().column(align=True)
@@ -160,7 +158,7 @@ class SOFTGROUND_PT_of_character(CharacterPanel, bpy.types.Panel):
                 layout.prop(character, field)
             return
         number, other = next(found for found in enumerate(options.characters) if belongs_to(found[1], obj))
-        text = translated("Choose '{name}'", name=title_of(other))
+        text = translated("Choose '{name}'", name=character_setup.title_of(other))
         button = layout.operator("wm.context_set_int", text=text, icon="ARMATURE_DATA", translate=False)
         button.data_path, button.value = "scene.softground.active_character", number
 
@@ -211,7 +209,14 @@ class SOFTGROUND_PT_joints(CharacterPanel, bpy.types.Panel):
         layout.prop(character, "armature")
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
         layout.template_list(
-            "SOFTGROUND_UL_joints", "", character, "joints", character, "active_joint", rows=5, maxrows=len(JOINTS)
+            "SOFTGROUND_UL_joints",
+            "",
+            character,
+            "joints",
+            character,
+            "active_joint",
+            rows=5,
+            maxrows=len(motion.JOINTS),
         )
         if joint := chosen_of(character, "joints", "active_joint"):
             layout.prop_search(joint, "bone", character.armature.data, "bones")

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, settings
-from ..characters.character_setup import characters_of, title_of
+from ..characters import character_setup
 from ..operator_base import reports_errors
 from ..preset_files import listed, loaded, user_folder
 from ..reading import analysis
@@ -95,7 +95,9 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         lines = [preset.source] if preset.source else []
         depth = analysis.expected_depth(settings.scene_of(context), preset.material)
         if depth is not None:
-            who = ", ".join(title_of(c) for c in characters_of(settings.options_of(context)))
+            who = ", ".join(
+                character_setup.title_of(c) for c in character_setup.characters_of(settings.options_of(context))
+            )
             lines.append(
                 translated("Depth of the typical step of {who}: {depth} cm", who=who, depth=f"{depth * 100:.1f}")
             )

@@ -8,12 +8,12 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ...core.composers.responses import NOTICEABLE_GAP_MM
+from ...core.composers import responses
 from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
 from .. import session, settings
 from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
 from ..baking import root_motion
-from ..characters.import_fixes import sizes_of
+from ..characters import import_fixes
 from ..operators.character_editing import active_character
 from ..operators.panel_base import CharacterPanel, SidebarPanel
 from ..response import response_job
@@ -53,7 +53,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
             character
             and character.armature
             and character.mass > 0
-            and sizes_of(scene.unit_settings.scale_length, character)[0] > 0
+            and import_fixes.sizes_of(scene.unit_settings.scale_length, character)[0] > 0
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -61,7 +61,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
         character = active_character(scene.softground)
         body = {
             "mass": character.mass,
-            "arm": CENTRE_HEIGHT * sizes_of(scene.unit_settings.scale_length, character)[0],
+            "arm": CENTRE_HEIGHT * import_fixes.sizes_of(scene.unit_settings.scale_length, character)[0],
         }
         gains = {
             "DEFAULT": TiltGains(),
@@ -316,7 +316,7 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row.label(text=translated("Suggested Speed {speed}", speed=speed), icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
     for frame, gap_mm, sole in response_job.worst_gaps_in(notes)[:_SHOWN]:
-        if abs(gap_mm) >= NOTICEABLE_GAP_MM:
+        if abs(gap_mm) >= responses.NOTICEABLE_GAP_MM:
             shown = translated(
                 "Frame {frame}: {gap} mm under {sole}", frame=f"{frame:g}", gap=f"{gap_mm:.1f}", sole=sole
             )

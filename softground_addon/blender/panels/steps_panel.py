@@ -8,7 +8,6 @@ import bpy
 
 from .. import settings
 from ..ground import baked_ground, baked_steps
-from ..ground.baked_steps import BakedStep
 from ..live import live
 from ..operators.panel_base import SidebarPanel
 from ..translation import translated
@@ -45,7 +44,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
             layout.operator("softground.reset_steps", icon="LOOP_BACK")
 
 
-def _list(layout: Any, steps: Any, chosen: list[BakedStep]) -> None:
+def _list(layout: Any, steps: Any, chosen: list[baked_steps.BakedStep]) -> None:
     """Some of the steps, those around the first chosen one; with a way to those before and after."""
     at = chosen[0].number - 1 if chosen else 0
     first = max(0, min(at - SHOWN // 2, len(steps) - SHOWN))
@@ -61,7 +60,7 @@ def _list(layout: Any, steps: Any, chosen: list[BakedStep]) -> None:
         part.operator("softground.choose_step", text=text, icon=icon).step = name
 
 
-def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
+def _row(layout: Any, step: baked_steps.BakedStep, *, is_chosen: bool) -> None:
     """A step as one button: number, side, frames, depth, force."""
     first, last = step.frames
     nothing = translated("muted") if step.edit.mute else "" if step.footprint else translated("nothing left")
@@ -76,7 +75,7 @@ def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
     ).step = step.name
 
 
-def _buttons(layout: Any, chosen: list[BakedStep]) -> None:
+def _buttons(layout: Any, chosen: list[baked_steps.BakedStep]) -> None:
     """What can be done to the chosen steps."""
     row = layout.row(align=True)
     is_muted = chosen[0].edit.mute

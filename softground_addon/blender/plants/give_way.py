@@ -17,12 +17,6 @@ from .trampling_table import modifier_of
 MODIFIER = nodes.GROUP
 LITTER = {"LITTER": 0.0, "PEBBLES": 0.12}
 """Kinds of what lies on the ground, and how far they roll where it is hard [m]."""
-KINDS = (
-    *((key, title, f"Plants that bend and rise like {title.lower()}") for key, (title, _) in PLANTS.items()),
-    ("LITTER", "Leaves and Twigs", "What lies on the ground, is pressed in, tilts with the prints, and is thrown"),
-    ("PEBBLES", "Pebbles", "As leaves and twigs; on hard ground they roll aside"),
-)
-"""What gives way, as an enum has it."""
 SCATTERS = ("MESH", "CURVES")
 """Types of objects that give way."""
 _SHAPES = ("MESH", "CURVE", "CURVES", "SURFACE")
@@ -36,7 +30,7 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        Key of `PLANTS` or `LITTER`.
     table : bpy.types.Object
         From `trampling_table`.
     grounds : collection of bpy.types.Object

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -59,6 +59,19 @@ INPUTS = (
         (0.0, 1e7),
     ),
 )
+
+PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "SNOWFALL": (
+        "Snowfall",
+        {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
+    ),
+    "THAW": ("Thaw", {"Temperature": 3.0, "Time Scale": 20_000.0}),
+    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 60.0}),
+    "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
+    "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),
+}
+"""Title of each preset, and its inputs where they are not as in a new group. Ten seconds show a night of snow, two days
+of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
 def new() -> Any:

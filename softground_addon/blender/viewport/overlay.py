@@ -21,10 +21,8 @@ from ..operators import prediction
 from ..operators.modal_job import Reading, ReadingShot
 from ..placement import in_scene
 from ..reading import analysis
-from ..reading.analysis import Analysis
 from ..state import state
 from . import overlay_shapes
-from .overlay_shapes import Cells, Outline
 
 Colour = tuple[float, float, float, float]
 
@@ -50,7 +48,7 @@ TEXT_SIZE = 13
 """The footfalls of each shot that was shown, as long as it is known."""
 
 
-def _footfalls(known: Analysis) -> list[Outline]:
+def _footfalls(known: analysis.Analysis) -> list[overlay_shapes.Outline]:
     if known not in state.outlines:
         state.outlines[known] = overlay_shapes.footfalls(known.loads, known.shot.terrain)
     return state.outlines[known]
@@ -147,7 +145,7 @@ def draw_numbers() -> None:
     blf.disable(0, blf.SHADOW)
 
 
-def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
+def _cells(scene: bpy.types.Scene) -> tuple[overlay_shapes.Cells, overlay_shapes.Cells, float]:
     """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
     shown = live.in_contact(scene.session_uid)
     if shown is not None:

@@ -16,10 +16,8 @@ from ...core.errors import SoftGroundError
 from ...core.numerics.arrays import Array
 from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
-from ..baking import step_edits
-from ..baking.step_preview import StepPreview
+from ..baking import step_edits, step_preview
 from ..ground import baked_ground, baked_steps
-from ..ground.baked_steps import BakedStep
 from ..placement import from_scene, in_scene
 from ..remedies import said
 from ..state import state
@@ -45,9 +43,9 @@ FINE = 0.1
 class _Drag:
     """A step that is being dragged: those that go with it, what shows it, where it is, if that takes long."""
 
-    step: BakedStep
-    steps: Sequence[BakedStep]
-    preview: StepPreview
+    step: baked_steps.BakedStep
+    steps: Sequence[baked_steps.BakedStep]
+    preview: step_preview.StepPreview
     mouse: Array
     edit: StepEdit
     is_slow: bool = False
@@ -133,7 +131,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             else:
                 if step.name not in session.chosen_steps():
                     session.choose_steps(step.name)
-                preview = StepPreview(scene.softground.ground, jobs.run(step_edits.reading(scene)))
+                preview = step_preview.StepPreview(scene.softground.ground, jobs.run(step_edits.reading(scene)))
                 mouse = _on_plane(region, view, event, step.height)
                 mouse = step.baked.position[:2] if mouse is None else mouse
                 self._drag = _Drag(step, baked_steps.chosen(scene.softground.ground), preview, mouse, step.edit)
@@ -246,7 +244,9 @@ def _on_plane(region: Any, view: Any, event: bpy.types.Event, height: float) -> 
     return place if along > 0 or not view.is_perspective else None
 
 
-def _under(steps: Sequence[BakedStep], region: Any, view: Any, event: bpy.types.Event) -> BakedStep | None:
+def _under(
+    steps: Sequence[baked_steps.BakedStep], region: Any, view: Any, event: bpy.types.Event
+) -> baked_steps.BakedStep | None:
     """The step whose outline is under the mouse, or near it."""
     best, nearest = None, 1.0
     for step in steps:
@@ -262,7 +262,9 @@ def _under(steps: Sequence[BakedStep], region: Any, view: Any, event: bpy.types.
     return best
 
 
-def _within(box: Sequence[tuple[int, int]], steps: Sequence[BakedStep], region: Any, view: Any) -> list[str]:
+def _within(
+    box: Sequence[tuple[int, int]], steps: Sequence[baked_steps.BakedStep], region: Any, view: Any
+) -> list[str]:
     """Ids of the steps whose middles are seen within a box, two of its corners being given [px]."""
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
@@ -318,7 +320,7 @@ def draw_numbers() -> None:
         overlay.draw_line(overlay.closed(corners), overlay.SIDES[""], overlay.LINE)
 
 
-def _outlined(ground: bpy.types.Object | None) -> list[tuple[BakedStep, StepEdit, bool]]:
+def _outlined(ground: bpy.types.Object | None) -> list[tuple[baked_steps.BakedStep, StepEdit, bool]]:
     """Which steps are outlined, where, and which of them is chosen: while one is picked, all of them."""
     if ground is None or not baked_ground.is_baked(ground):
         return []

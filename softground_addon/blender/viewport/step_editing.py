@@ -29,7 +29,6 @@ from ...core.record.mesh_sole import MeshSole
 from .. import jobs, session, settings
 from ..baking import step_edits, step_soles
 from ..ground import baked_ground, baked_steps
-from ..ground.baked_steps import BakedStep
 from ..live import live
 from ..operator_base import OnBake
 from ..operators import show_prints
@@ -61,7 +60,7 @@ class OnStep(OnSteps):
         name="Steps", description="Ids of the steps, one per line; the selected ones if empty", options={"HIDDEN"}
     )
 
-    def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
+    def chosen(self, scene: bpy.types.Scene) -> list[baked_steps.BakedStep]:
         """The steps that are meant, first the one that the panel shows."""
         if not self.step:
             self.step = "\n".join(step.name for step in baked_steps.chosen(scene.softground.ground))
@@ -108,7 +107,9 @@ def _edited(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], chosen: list[
     return chosen
 
 
-def changed(ground: bpy.types.Object, changes: Iterable[tuple[BakedStep, StepEdit | None]]) -> dict[str, StepEdit]:
+def changed(
+    ground: bpy.types.Object, changes: Iterable[tuple[baked_steps.BakedStep, StepEdit | None]]
+) -> dict[str, StepEdit]:
     """All edits of the bake, with others of some steps; see `edits.with_edit`."""
     edits = dict(baked_ground.edits_of(ground))
     for step, edit in changes:
@@ -117,7 +118,7 @@ def changed(ground: bpy.types.Object, changes: Iterable[tuple[BakedStep, StepEdi
 
 
 def copied(
-    ground: bpy.types.Object, copies: Iterable[tuple[BakedStep, StepEdit]]
+    ground: bpy.types.Object, copies: Iterable[tuple[baked_steps.BakedStep, StepEdit]]
 ) -> tuple[dict[str, StepEdit], list[str]]:
     """All edits of the bake with copies of some steps, and their names."""
     edits, names = dict(baked_ground.edits_of(ground)), []
@@ -279,7 +280,7 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         return with_meshes(edits, {self.sole: mesh}) if mesh else edits, []
 
 
-def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> MeshSole | None:
+def _mesh(scene: bpy.types.Scene, steps: Sequence[baked_steps.BakedStep], sole: str) -> MeshSole | None:
     """The sole of the mesh that is to press some steps; None for a foot of the bake, and for their own.
 
     Raises
@@ -343,7 +344,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
         return copied(scene.softground.ground, [(step, replace(edit, mute=False, shift_frames=shift))])
 
 
-def _moved(step: BakedStep, move: Sequence[float]) -> StepEdit:
+def _moved(step: baked_steps.BakedStep, move: Sequence[float]) -> StepEdit:
     """The edit of a step, with another move [m]."""
     if max(map(abs, move)) > FARTHEST:
         raise InputError(

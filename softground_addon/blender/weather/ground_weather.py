@@ -28,24 +28,12 @@ from ..playback import own_data, weather_inputs, weather_modifier, weather_table
 from ..playback import playback_nodes as played
 from ..playback import weather_nodes as nodes
 from ..playback.weather_course_nodes import HOLLOWS
+from ..playback.weather_inputs import PRESETS
 from . import weather_keys
 from .weather_keys import WeatherBefore
 from .weather_regions import WeatherRegions, regions_of
 
 READING = jobs.Progress("sample", 0.5)
-
-PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
-    "SNOWFALL": (
-        "Snowfall",
-        {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
-    ),
-    "THAW": ("Thaw", {"Temperature": 3.0, "Time Scale": 20_000.0}),
-    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 60.0}),
-    "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
-    "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),
-}
-"""Title of each preset, and its inputs where they are not as in a new group. Ten seconds show a night of snow, two days
-of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
 def add(ground: bpy.types.Object, record: BakeRecord | None = None) -> Any:

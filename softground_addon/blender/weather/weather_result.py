@@ -7,13 +7,10 @@ from typing import Any
 
 import bpy
 
-from ...core.weather.weather import HOUR, Span, matter_of, span_of
-from ...core.weather.weather_course import Weather, course_of
+from ...core.weather import weather, weather_course
 from .. import compat, settings
 from ..ground import baked_ground
-from ..playback import weather_modifier
-from ..playback.weather_course_nodes import FIRST
-from ..playback.weather_nodes import within
+from ..playback import weather_course_nodes, weather_modifier, weather_nodes
 from . import weather_keys
 
 NIGHT = 8.0
@@ -25,7 +22,7 @@ MOST_SNOW, ROUNDS = 100.0, 40
 def modifier_of(ground: bpy.types.Object | None) -> Any:
     """The weather on a scene's ground; None where there is none."""
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
-    return modifier if modifier and modifier.node_group and within(modifier.node_group) else None
+    return modifier if modifier and modifier.node_group and weather_nodes.within(modifier.node_group) else None
 
 
 def hours(scene: bpy.types.Scene) -> float:
@@ -33,14 +30,14 @@ def hours(scene: bpy.types.Scene) -> float:
     modifier = modifier_of(scene.softground.ground)
     if not modifier:
         return 0.0
-    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(*_span(scene, modifier)) / HOUR
+    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(*_span(scene, modifier)) / weather.HOUR
 
 
 def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
     """Have the scene last so long [h]; as much snow lies at its end as before."""
     if modifier := modifier_of(scene.softground.ground):
         depth = snow_cm(scene)
-        _write(modifier, "Time Scale", wanted * HOUR / _seconds(*_span(scene, modifier)))
+        _write(modifier, "Time Scale", wanted * weather.HOUR / _seconds(*_span(scene, modifier)))
         set_snow_cm(scene, depth)
 
 
@@ -61,27 +58,29 @@ def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
         _write(modifier, "Snowfall", most)
 
 
-def _cover_cm(modifier: Any, surface: str, span: Span, end: float) -> Callable[..., float]:
+def _cover_cm(modifier: Any, surface: str, span: weather.Span, end: float) -> Callable[..., float]:
     """Depth of new snow at the end [cm] as a function of the snowfall [cm/h], by default that of the slider."""
-    rates, matter = weather_keys.rates(modifier, span), matter_of(surface, 0.0, 1.0)
+    rates, matter = weather_keys.rates(modifier, span), weather.matter_of(surface, 0.0, 1.0)
 
     def cover(snowfall: float | None = None) -> float:
-        falls = rates["snowfall"] if snowfall is None else snowfall * 0.01 / HOUR
-        course = course_of(Weather(**rates | {"snowfall": falls}), matter, frame=end, span=span)
+        falls = rates["snowfall"] if snowfall is None else snowfall * 0.01 / weather.HOUR
+        course = weather_course.course_of(
+            weather_course.Weather(**rates | {"snowfall": falls}), matter, frame=end, span=span
+        )
         return 100.0 * float(course.cover[0])
 
     return cover
 
 
-def _span(scene: bpy.types.Scene, modifier: Any) -> tuple[Span, float]:
+def _span(scene: bpy.types.Scene, modifier: Any) -> tuple[weather.Span, float]:
     """The span of the weather, and the scene's last frame, both in the time that playback counts."""
     tree, stretch = modifier.node_group, settings.time_stretch_of(scene)
-    first = within(tree).nodes[FIRST].outputs[0].default_value
+    first = weather_nodes.within(tree).nodes[weather_course_nodes.FIRST].outputs[0].default_value
     end = float(max(scene.frame_end * stretch, first + 1.0))
-    return span_of(first, max(end, tree[weather_keys.LAST]), settings.frame_rate_of(scene) * stretch), end
+    return weather.span_of(first, max(end, tree[weather_keys.LAST]), settings.frame_rate_of(scene) * stretch), end
 
 
-def _seconds(span: Span, end: float) -> float:
+def _seconds(span: weather.Span, end: float) -> float:
     return (end - span.first) / span.frame_rate
 
 

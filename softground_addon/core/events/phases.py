@@ -9,9 +9,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..loads.contacts import REST_SPEED
-from ..loads.estimate import CharacterLoads
-from ..motion.sole_motion import SoleMotion
+from ..loads import contacts, estimate
+from ..motion import sole_motion
 from ..numerics.arrays import Array
 from ..numerics.intervals import runs
 
@@ -69,7 +68,7 @@ class Phase:
     hard: bool = False
 
 
-def phases(loads: CharacterLoads) -> list[Phase]:
+def phases(loads: estimate.CharacterLoads) -> list[Phase]:
     """All phases of a character's contacts, in the order of time.
 
     A contact that has begun before the loads has no landing, and one that goes on after them no leaving.
@@ -79,13 +78,13 @@ def phases(loads: CharacterLoads) -> list[Phase]:
     return sorted(unsorted, key=lambda phase: (phase.moment, phase.sole))
 
 
-def normal_force(loads: CharacterLoads, sole: int) -> Array:
+def normal_force(loads: estimate.CharacterLoads, sole: int) -> Array:
     """Force of the ground on a sole along its normal, (N,) [N]."""
     along = np.einsum("ni,ni->n", loads.forces.forces[:, sole], loads.contacts.normal[:, sole])
     return np.asarray(np.maximum(along, 0.0))
 
 
-def slide_speed(loads: CharacterLoads, sole: int) -> Array:
+def slide_speed(loads: estimate.CharacterLoads, sole: int) -> Array:
     """Speed along the ground of a sole's slowest point, (N,) [m/s]: 0 of one that rolls from heel to toe."""
     motion, normal = loads.motion.soles[sole], loads.contacts.normal[:, sole]
     if len(motion.transforms) < 2:
@@ -95,7 +94,7 @@ def slide_speed(loads: CharacterLoads, sole: int) -> Array:
     return np.asarray(np.linalg.norm(along, axis=2).min(axis=1))
 
 
-def landing_speed(loads: CharacterLoads, sole: int, at: int) -> float:
+def landing_speed(loads: estimate.CharacterLoads, sole: int, at: int) -> float:
     """Speed into the ground of a sole's first touching point, shortly before a step [m/s]."""
     before = max(1, round(APPROACH * loads.motion.time_scale / loads.motion.time_step))
     steps = slice(max(0, at - before), at + 1)
@@ -105,14 +104,14 @@ def landing_speed(loads: CharacterLoads, sole: int, at: int) -> float:
     return float(max(0.0, -np.diff(points[:, points[-1].argmin()]).min() / loads.motion.time_step))
 
 
-def place_of(loads: CharacterLoads, sole: int, at: int) -> Array:
+def place_of(loads: estimate.CharacterLoads, sole: int, at: int) -> Array:
     """The lowest point of a sole at a step, where it would be without the source's float or sink, (3,) [m]."""
     points, normal = _points(loads.motion.soles[sole], slice(at, at + 1))[0], loads.contacts.normal[at, sole]
     lowest: Array = points[(points @ normal).argmin()] - loads.contacts.offset[sole] * normal
     return lowest
 
 
-def sole_points_at(loads: CharacterLoads, sole: int, steps: NDArray[np.intp]) -> tuple[Array, Array]:
+def sole_points_at(loads: estimate.CharacterLoads, sole: int, steps: NDArray[np.intp]) -> tuple[Array, Array]:
     """Tracked points of a sole at K steps, and their velocities there: (K, L, 3) [m] and [m/s]."""
     first = np.clip(steps, 0, max(0, len(loads.motion.frames) - 2))
     motion = loads.motion.soles[sole]
@@ -121,12 +120,12 @@ def sole_points_at(loads: CharacterLoads, sole: int, steps: NDArray[np.intp]) ->
     return now - lift[:, None], (later - now) / loads.motion.time_step
 
 
-def sole_velocity(loads: CharacterLoads, sole: int, step: int) -> Array:
+def sole_velocity(loads: estimate.CharacterLoads, sole: int, step: int) -> Array:
     """Velocity of the middle of a sole after a step, (3,) [m/s]."""
     return np.asarray(sole_points_at(loads, sole, np.array([step]))[1][0].mean(axis=0))
 
 
-def _places(motion: SoleMotion, steps: NDArray[np.intp]) -> Array:
+def _places(motion: sole_motion.SoleMotion, steps: NDArray[np.intp]) -> Array:
     """Matter of a sole at steps, (K, L, 3) [m]: a foot's landmarks; of a prop, points of its surface."""
     if motion.sole.prop is None:
         return motion.landmark_positions()[steps]
@@ -134,12 +133,12 @@ def _places(motion: SoleMotion, steps: NDArray[np.intp]) -> Array:
     return np.asarray(np.einsum("kij,lj->kli", pose[:, :3, :3], probes) + pose[:, None, :3, 3])
 
 
-def is_foot(motion: SoleMotion) -> bool:
+def is_foot(motion: sole_motion.SoleMotion) -> bool:
     """True if a sole has a heel and a ball to roll over."""
     return motion.sole.prop is None and len(motion.sole.landmarks) > 1
 
 
-def _points(motion: SoleMotion, steps: slice) -> Array:
+def _points(motion: sole_motion.SoleMotion, steps: slice) -> Array:
     """Tracked points of a sole, (N, L, 3) [m]: a foot's landmarks; the lowest point of a prop."""
     if motion.sole.prop is None:
         return motion.landmark_positions()[steps]
@@ -148,7 +147,7 @@ def _points(motion: SoleMotion, steps: slice) -> Array:
     return np.asarray(np.einsum("nij,nj->ni", pose[:, :3, :3], lowest) + pose[:, :3, 3])[:, None]
 
 
-def _velocities(loads: CharacterLoads, sole: int) -> Array:
+def _velocities(loads: estimate.CharacterLoads, sole: int) -> Array:
     """Velocities of the matter at `_points`, (N, L, 3) [m/s]."""
     motion, step = loads.motion.soles[sole], loads.motion.time_step
     if motion.sole.prop is None:
@@ -159,7 +158,7 @@ def _velocities(loads: CharacterLoads, sole: int) -> Array:
     return np.asarray(np.einsum("nij,nj->ni", change[:, :3, :3], lowest) + change[:, :3, 3])[:, None]
 
 
-def _of_contacts(loads: CharacterLoads, sole: int) -> Iterator[Phase]:
+def _of_contacts(loads: estimate.CharacterLoads, sole: int) -> Iterator[Phase]:
     touching, hard = loads.contacts.standing[:, sole], loads.contacts.hard
     speed, force = slide_speed(loads, sole), normal_force(loads, sole)
     least = LOADED * loads.motion.mass * loads.motion.gravity
@@ -187,7 +186,7 @@ def _crossing(force: Array, step: int, level: float) -> float:
     return step - 1 + float((level - before) / (after - before)) if before != after else float(step)
 
 
-def _landing(loads: CharacterLoads, sole: int, begin: int) -> Kind:
+def _landing(loads: estimate.CharacterLoads, sole: int, begin: int) -> Kind:
     """Kind of a contact's begin: a foot that walks or runs strikes; both feet out of a jump, and all else, land."""
     if not is_foot(loads.motion.soles[sole]):
         return "land"
@@ -200,7 +199,7 @@ def _landing(loads: CharacterLoads, sole: int, begin: int) -> Kind:
     return "land" if in_flight and together else "heel_strike"
 
 
-def _rolling(loads: CharacterLoads, sole: int, begin: int, stop: int) -> list[tuple[int, Kind]]:
+def _rolling(loads: estimate.CharacterLoads, sole: int, begin: int, stop: int) -> list[tuple[int, Kind]]:
     """Steps at which a foot gets flat and its heel leaves, if both happen within the contact."""
     motion = loads.motion.soles[sole]
     points = motion.landmark_positions()[begin:stop]
@@ -218,10 +217,10 @@ def _rolling(loads: CharacterLoads, sole: int, begin: int, stop: int) -> list[tu
     return rolling
 
 
-def _slides(loads: CharacterLoads, sole: int, speed: Array, begin: int, stop: int) -> Iterator[Phase]:
+def _slides(loads: estimate.CharacterLoads, sole: int, speed: Array, begin: int, stop: int) -> Iterator[Phase]:
     """Slides of a standing sole: faster than rest allows, and not as it lands or leaves."""
     scale = loads.motion.time_scale / loads.motion.time_step
-    sliding = speed[begin:stop] > REST_SPEED * loads.motion.froude_speed
+    sliding = speed[begin:stop] > contacts.REST_SPEED * loads.motion.froude_speed
     edge = round(LEAVING * scale) if is_foot(loads.motion.soles[sole]) else 0
     for first, last in zip(*(ends.tolist() for ends in runs(sliding)), strict=True):
         if min(last, stop - begin - edge) - max(first, edge) >= SHORTEST_SLIDE * scale:
@@ -231,7 +230,7 @@ def _slides(loads: CharacterLoads, sole: int, speed: Array, begin: int, stop: in
                 yield Phase("slide_end", sole, span[1], span[1], *span)
 
 
-def _of_scuffs(loads: CharacterLoads, sole: int) -> Iterator[Phase]:
+def _of_scuffs(loads: estimate.CharacterLoads, sole: int) -> Iterator[Phase]:
     """Scuffs: a swinging foot brushes the ground."""
     motion = loads.motion
     if not is_foot(motion.soles[sole]):

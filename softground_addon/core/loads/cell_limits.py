@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..numerics.arrays import Array
-from .estimate import CharacterLoads
+from . import estimate
 from .tracks import tracks
 
 BYTES_PER_VERTEX = 900.0
@@ -143,7 +143,7 @@ class Coverage:
         return BYTES_AT_LEAST + float(memory), SECONDS_AT_LEAST + float(simulating + writing)
 
 
-def coverage_of(loads: Sequence[CharacterLoads]) -> Coverage:
+def coverage_of(loads: Sequence[estimate.CharacterLoads]) -> Coverage:
     """Coverage of the soles of all characters."""
     area = edge = 0.0
     boxes, steps = [], []
@@ -166,7 +166,7 @@ def coverage_of(loads: Sequence[CharacterLoads]) -> Coverage:
 
 
 def check_cell_size(
-    loads: Sequence[CharacterLoads],
+    loads: Sequence[estimate.CharacterLoads],
     fine: Fineness,
     longest: float,
     available: float | None = None,
@@ -212,7 +212,7 @@ def check_cell_size(
     raise _refused(message, too_much, f"{larger}bake fewer frames.", *taken(cell_size))
 
 
-def _shortest_of_largest(loads: Sequence[CharacterLoads]) -> float:
+def _shortest_of_largest(loads: Sequence[estimate.CharacterLoads]) -> float:
     """Length of the longest sole of the smallest character: cells are to be smaller [m]."""
     return min(max(sole.sole.length for sole in character.motion.soles) for character in loads)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..numerics.intervals import runs
-from .estimate import CharacterLoads
+from . import estimate
 
 LONGEST_TRACK = 8.0
 """Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
@@ -18,7 +18,7 @@ SHORTEST_SLIDE = 0.08
 """... if it takes as long for it [s]."""
 
 
-def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
+def tracks(character: estimate.CharacterLoads, index: int) -> Iterator[slice]:
     """The steps of each print of a sole; the contacts of one that travels far are cut.
 
     Those of a foot or another limb that slides, in a gait on the spot or on skates, are cut into even pieces of at most

@@ -16,14 +16,12 @@ from ..numerics.arrays import Array, Indices
 from ..numerics.slices import Slices, sliced
 from ..skin.skin_motion import SkinMotion
 from ..skin.twins import twins
+from ..skin.volume import welded
 from .bones import RigBones, above
 from .recording import Recording
 
 _AGAINST = 0.01
 """Boxes around parts that are nearer than this over the size of the mesh touch."""
-
-_WELD = 1e-5
-"""Vertices nearer than this over the size of the mesh are one."""
 
 
 @dataclass(frozen=True)
@@ -274,11 +272,9 @@ def _links(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
     corners = skin.part[skin.triangles]
     for start, end in ((0, 1), (1, 2), (2, 0)):
         links[corners[:, start], corners[:, end]] = True
-    # Imported meshes are cut open along their edges: vertices in one place are one.
-    size = max(float(np.ptp(skin.vertices, axis=0).max()), 1e-12)
-    _, place = np.unique(np.round(skin.vertices / (_WELD * size)), axis=0, return_inverse=True)
-    order = np.lexsort((skin.part, place.ravel()))
-    same = np.diff(place.ravel()[order]) == 0
+    place = welded(skin.vertices)
+    order = np.lexsort((skin.part, place))
+    same = np.diff(place[order]) == 0
     links[skin.part[order[1:]][same], skin.part[order[:-1]][same]] = True
     number = {name: index for index, name in enumerate(skin.bones)}
     for name, index in number.items():

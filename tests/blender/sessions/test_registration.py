@@ -1,5 +1,10 @@
 """The add-on comes and goes as a whole."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import bpy
 import pytest
 
@@ -12,6 +17,9 @@ def nothing_registered(addon):
     registration.unregister()
     yield
     registration.register()
+
+
+ROOT = Path(__file__).parents[3]
 
 
 def is_registered():
@@ -35,3 +43,40 @@ def test_an_error_half_way_leaves_nothing_behind(nothing_registered, monkeypatch
         with pytest.raises(ZeroDivisionError):
             registration.register()
     assert is_registered() == (False, False)
+
+
+ENABLED = """
+import sys
+import bpy
+import softground_addon
+
+
+def run():
+    ours = {name: module for name, module in sys.modules.items() if name.startswith("softground_addon.")}
+    return {name.partition(".")[2] for name, module in ours.items() if "NotYetRun" not in type(module).__name__}
+
+
+bpy.ops.wm.read_factory_settings()
+for _ in range(2):
+    softground_addon.register()
+    enabled = run()
+    bpy.data.objects["Cube"].location.x += 1.0
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(2)
+    bpy.ops.wm.read_factory_settings()
+    for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.render_init, bpy.app.handlers.render_complete):
+        handlers[-1](bpy.context.scene)
+    softground_addon.unregister()
+    print(*(enabled | run()))
+"""
+
+
+def test_enabling_runs_no_module_that_bakes_nor_does_anything_without_a_ground(tmp_path):
+    program = tmp_path / "enabled.py"
+    program.write_text(ENABLED)
+    paths = os.environ | {"PYTHONPATH": str(ROOT)}
+    finished = subprocess.run([sys.executable, program], env=paths, capture_output=True, text=True, check=True)
+    first, second = (set(line.split()) for line in finished.stdout.splitlines() if "blender.registration" in line)
+    assert first == second >= {"blender.registration", "core.settings"}
+    assert not [name for name in first if name.startswith(("core.pressing.", "core.relief.", "blender.reading."))]
+    assert len(first) < 170

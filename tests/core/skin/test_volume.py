@@ -119,6 +119,15 @@ def test_a_copy_that_shares_half_of_its_faces_counts_once():
     assert body_volume(both[0][first], place[both[1]]) == pytest.approx(BALL, rel=0.05)
 
 
+@pytest.mark.parametrize("away", [0.0, 1e3, -5.0])
+def test_points_at_one_place_are_those_whose_rounded_coordinates_are_equal(away):
+    points = np.random.default_rng(1).integers(-50_000, 50_000, size=(400, 3)) * 1e-3
+    cut = np.concatenate([points, points[::3] + 1e-6, points[::7, ::-1]]) + away
+    size = np.ptp(cut, axis=0).max()
+    _, rows = np.unique(np.round(cut / (1e-5 * size)), axis=0, return_inverse=True)
+    assert (welded(cut) == rows.ravel()).all()
+
+
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_faces_that_lie_on_each_other_back_to_back_take_nothing_away(share):
     vertices, triangles = sphere(1.0)
