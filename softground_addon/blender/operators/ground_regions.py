@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, IntProperty
 from ...core.ground import presets
 from .. import ground_slots, settings
 from ..ground_slots import HARD
-from ..operator_base import reports_errors
+from ..operator_base import Act
 from ..preset_files import listed, user_folder
 from ..state import state
 
@@ -37,7 +37,7 @@ def _rows(title: str, files: dict[presets.Preset, str], shown: Iterable[presets.
     return [("", title, ""), *((files[preset], preset.name, preset.source) for preset in shown)]
 
 
-class SOFTGROUND_OT_region_preset(bpy.types.Operator):
+class SOFTGROUND_OT_region_preset(Act):
     """Choose what the ground is made of where it has this material"""
 
     bl_idname = "softground.region_preset"
@@ -47,13 +47,11 @@ class SOFTGROUND_OT_region_preset(bpy.types.Operator):
     slot: IntProperty(name="Slot", description="Number of the material slot", min=0, options={"SKIP_SAVE"})
     preset: EnumProperty(name="Preset", description="What the ground is made of there", items=_choices)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         ground = settings.options_of(context).ground
         ground_slots.choose(
             ground if settings.exists(ground) else None, self.slot, "" if self.preset == AS_GROUND else self.preset
         )
-        return {"FINISHED"}
 
 
 CLASSES = (SOFTGROUND_OT_region_preset,)

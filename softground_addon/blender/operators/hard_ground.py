@@ -7,20 +7,17 @@ import bpy
 from ...core.errors import InputError
 from .. import settings
 from ..ground import ground_checks, trail_detail
-from ..operator_base import reports_errors
-from ..translation import translated
+from ..operator_base import Act
 from .panel_base import OnMeshes, RemovesChosen
 
 
-class SOFTGROUND_OT_add_hard_ground(OnMeshes, bpy.types.Operator):
+class SOFTGROUND_OT_add_hard_ground(OnMeshes, Act):
     """Let soles stand on the selected meshes, which take no prints: crates, stairs, floors, rocks"""
 
     bl_idname = "softground.add_hard_ground"
     bl_label = "Add Hard Ground"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         options = settings.options_of(context)
         taken = [*settings.grounds_of(options), *settings.hard_grounds_of(options)]
         chosen = [obj for obj in self.meshes(context) if trail_detail.ground_of(obj) not in taken]
@@ -32,8 +29,7 @@ class SOFTGROUND_OT_add_hard_ground(OnMeshes, bpy.types.Operator):
         for obj in chosen:
             options.hard_grounds.add().object = obj
         options.active_hard_ground = len(options.hard_grounds) - 1
-        self.report({"INFO"}, translated("Soles stand on {names}", names=", ".join(repr(obj.name) for obj in chosen)))
-        return {"FINISHED"}
+        self.say("Soles stand on {names}", names=", ".join(repr(obj.name) for obj in chosen))
 
 
 class SOFTGROUND_OT_remove_hard_ground(RemovesChosen):

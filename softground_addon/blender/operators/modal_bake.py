@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar
 
 import bpy
 
 from .. import jobs, session, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion, sink_feet
-from ..reading import analysis
 from ..translation import translated
 from . import prediction, show_prints
 from .modal_job import STAGE_NAMES, ModalJob, why_no_start
@@ -19,17 +17,9 @@ class _Bake(ModalJob):
     """Base of operators that bake."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is something to bake; otherwise the button says what is missing."""
-        reason = why_no_start(context)
-        if not reason and session.current().is_live:
-            reason = "Live mode is on: press Keep or Discard first"
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
-
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return analysis.own_changes(scene)
+    def missing(cls, context: bpy.types.Context) -> str:
+        is_live = session.current().is_live
+        return why_no_start(context) or ("Live mode is on: press Keep or Discard first" if is_live else "")
 
 
 class _Pressing(_Bake):
@@ -114,8 +104,7 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
 class _ChangingTheMotion(_Bake):
     """Base of operators whose layer changes the motion that bakes read."""
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return nullcontext()
+    keeps_shot = False
 
 
 class SOFTGROUND_OT_clean_feet(_ChangingTheMotion):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -20,12 +20,13 @@ from ..baking import step_edits
 from ..baking.step_preview import StepPreview
 from ..ground import baked_ground, baked_steps
 from ..ground.baked_steps import BakedStep
+from ..operator_base import Checked
 from ..placement import from_scene, in_scene
 from ..remedies import said
 from ..state import state
 from ..translation import translated
 from . import overlay
-from .step_editing import EditJob, OnSteps, changed, toggle
+from .step_editing import EditJob, OnSteps, Wanted, changed, toggle
 
 TURN_STEP = 5.0
 """How far the mouse wheel turns a step that is dragged [deg]."""
@@ -67,7 +68,7 @@ def _carried(edit: StepEdit, by: Array, turn: float) -> StepEdit:
     )
 
 
-class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
+class SOFTGROUND_OT_drag_step(OnSteps, Checked):
     """Pick a print in the viewport and drag it elsewhere; the wheel turns it, Esc cancels"""
 
     bl_idname = "softground.drag_step"
@@ -117,7 +118,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         """Outline the print under the mouse, and take hold of it at a click."""
         scene = settings.scene_of(context)
         if state.box:
-            return self._box(scene, event, region, view)
+            return self._box(scene.softground.ground, event, region, view)
         step = _under(baked_steps.of(scene.softground.ground), region, view, event) if region is not None else None
         if event.type == "MOUSEMOVE":
             name = step.name if step else ""
@@ -142,12 +143,12 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
 
-    def _box(self, scene: bpy.types.Scene, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
+    def _box(self, ground: bpy.types.Object, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
         """Follow the mouse with a box, and choose the steps whose middles are in it as the button is let go."""
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
         state.box = [state.box[0], (min(max(x, 0), region.width), min(max(y, 0), region.height))]
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            inside = _within(state.box, baked_steps.of(scene.softground.ground), region, view)
+            inside = _within(state.box, baked_steps.of(ground), region, view)
             names = [*(session.chosen_steps() if event.shift else ()), *inside]
             session.choose_steps(names[0] if names else "", names)
             state.box = ()
@@ -200,12 +201,9 @@ class SOFTGROUND_OT_drop_steps(OnSteps, EditJob):
     bl_label = "Drag in Viewport"
     bl_options = {"INTERNAL", "UNDO"}
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
         edits = state.edits
-        return changed(
-            scene.softground.ground,
-            [(step, edits[step.name]) for step in baked_steps.of(scene.softground.ground) if step.name in edits],
-        ), []
+        return changed(ground, [(step, edits[step.name]) for step in baked_steps.of(ground) if step.name in edits]), []
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
         try:
