@@ -14,20 +14,13 @@ from .importing import import_capture
 from .operators import (
     add_weather,
     bake_result,
-    character_editing,
-    cover_object,
     give_way,
-    ground_list,
-    ground_regions,
-    hard_ground,
     live_footprints,
     modal_bake,
     modal_job,
     prediction,
-    sample_scene,
     show_prints,
 )
-from .operators import shot_setup as operators
 from .output import event_points, export_formats, force_curves, make_sound
 from .panels import (
     foot_locks_panel,
@@ -43,6 +36,7 @@ from .panels import (
     weather_panel,
 )
 from .reading import analysis
+from .setup import character_editing, cover_object, ground_list, ground_regions, sample_scene, shot_setup
 from .viewport import overlay, step_dragging, step_editing
 from .weather import weather_result
 
@@ -55,11 +49,10 @@ _SETTINGS: tuple[tuple[Any, type], ...] = (
 CLASSES = (
     *session.CLASSES,
     *properties.CLASSES,
-    *operators.CLASSES,
+    *shot_setup.CLASSES,
     *character_editing.CLASSES,
     *ground_regions.CLASSES,
     *ground_list.CLASSES,
-    *hard_ground.CLASSES,
     *cover_object.CLASSES,
     *give_way.CLASSES,
     *sample_scene.CLASSES,

@@ -16,7 +16,7 @@ from ..characters.character_setup import title_of
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import Act, OnBake
 from ..translation import translated
-from .character_editing import active_character
+from .panel_base import active_character
 
 
 def draw(layout: Any, options: Any, summary: Any) -> None:

@@ -52,7 +52,7 @@ class SOFTGROUND_OT_live(ModalJob):
         if state.live is None:
             return (yield from live_start.starting(scene))
         if self.keep:
-            yield from state.live.keeping(state.live.current_scene() or scene)
+            yield from state.live.keeping()
             live.forget()
         else:
             live.discard()

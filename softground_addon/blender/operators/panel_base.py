@@ -99,6 +99,16 @@ def chosen_of(owner: Any, items: str, active: str) -> Any:
     return listed[number] if 0 <= number < len(listed) else None
 
 
+def active_character(options: Any) -> Any:
+    """The character that is chosen in the list, or None."""
+    return chosen_of(options, "characters", "active_character")
+
+
+def active_sole(options: Any) -> Any:
+    """The sole that is chosen in the list of the active character, or None."""
+    return chosen_of(active_character(options), "soles", "active_sole")
+
+
 class OnMeshes:
     """Operators on a mesh that is named, or on those that are selected."""
 

@@ -9,8 +9,7 @@ import bpy
 from ...core.errors import InputError
 from .. import settings
 from ..operator_base import Act
-from ..operators.character_editing import active_character
-from ..operators.panel_base import CharacterPanel, Listed, RemovesChosen, chosen_of, draw_list
+from ..operators.panel_base import CharacterPanel, Listed, RemovesChosen, active_character, chosen_of, draw_list
 from ..translation import CONTEXT
 
 

@@ -21,9 +21,18 @@ from ..characters.import_fixes import is_captured, sizes_of
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
-from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import CharacterPanel, Listed, SidebarPanel, belongs_to, chosen_of, draw_list
+from ..operators.panel_base import (
+    CharacterPanel,
+    Listed,
+    SidebarPanel,
+    active_character,
+    active_sole,
+    belongs_to,
+    chosen_of,
+    draw_list,
+)
 from ..settings import is_prop, is_set_up
+from ..setup.character_editing import suggested_mass
 from ..translation import translated
 from . import outdated, preset_menu
 

@@ -15,9 +15,8 @@ from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
 from ..baking import root_motion
 from ..characters.import_fixes import sizes_of
 from ..operator_base import Act
-from ..operators.character_editing import active_character
 from ..operators.modal_job import BUSY
-from ..operators.panel_base import CharacterPanel, SidebarPanel
+from ..operators.panel_base import CharacterPanel, SidebarPanel, active_character
 from ..response import response_job
 from ..translation import translated
 

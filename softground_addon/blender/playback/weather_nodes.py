@@ -117,17 +117,22 @@ def build(
     asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
     tables = {name: existing[name] or weather_table.new() for name in asked}
     weather_table.describe(inner, matter, span, soaking)
-    fill = partial(
-        _fill,
-        matter=matter,
-        up=up,
-        span=span,
-        soaking=soaking,
-        felt=felt,
-        again=again,
-        has_water=has_water,
-        tables=tables,
-    )
+
+    def fill(graph: NodeGraph) -> None:
+        """Make the nodes."""
+        group = graph.node("NodeGroupInput")
+        said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
+        course = CourseNodes(graph, said, matter, span, soaking, tables[TABLE])
+        ground = _Vertices(graph, course, matter, up, again=again, has_water=has_water, hollows=tables.get(HOLLOWS))
+
+        graph.next_row()
+        geometry = group.outputs["Geometry"]
+        changed = ground.pressed(geometry) if felt and matter.snow_depth else geometry
+        changed = ground.moved(changed, said["Water Table"] * 0.01)
+        if matter.wet:
+            changed = ground.dried(changed, said["Halo"])
+        graph.finish(graph.choose("GEOMETRY", course.is_any.socket, geometry, changed))
+
     try:
         yield from node_graph.build.slices(inner, fill)
         yield from node_graph.build.slices(tree, partial(hold, inner=inner))
@@ -137,33 +142,6 @@ def build(
         weather_table.remove_unused(tables.values())
         raise
     weather_table.remove_unused(existing.values())
-
-
-def _fill(
-    graph: NodeGraph,
-    *,
-    matter: Matter,
-    up: Sequence[float],
-    span: Span,
-    soaking: tuple[float, float],
-    felt: bool,
-    again: bool,
-    has_water: bool,
-    tables: Mapping[str, Any],
-) -> None:
-    """Make the nodes of a group; see `build`."""
-    group = graph.node("NodeGroupInput")
-    said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
-    course = CourseNodes(graph, said, matter, span, soaking, tables[TABLE])
-    ground = _Vertices(graph, course, matter, up, again=again, has_water=has_water, hollows=tables.get(HOLLOWS))
-
-    graph.next_row()
-    geometry = group.outputs["Geometry"]
-    changed = ground.pressed(geometry) if felt and matter.snow_depth else geometry
-    changed = ground.moved(changed, said["Water Table"] * 0.01)
-    if matter.wet:
-        changed = ground.dried(changed, said["Halo"])
-    graph.finish(graph.choose("GEOMETRY", course.is_any.socket, geometry, changed))
 
 
 class _Vertices:

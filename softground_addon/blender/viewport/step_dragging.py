@@ -36,6 +36,8 @@ _HINT = (
     "Drag: move a print   ·   Shift Click: extend the selection   ·   Drag beside prints: box select   ·   "
     "Wheel: rotate   ·   Shift: precise   ·   Esc: cancel"
 )
+WHITE = (1.0, 1.0, 1.0, 1.0)
+"""Colour of their numbers."""
 SLOW = 0.1
 """Of several steps only the outlines follow the mouse, until they are dropped, once pressing them took longer [s]."""
 FINE = 0.1
@@ -281,16 +283,11 @@ def draw_outlines() -> None:
     if context.scene is None or not (state.picking or session.current().step):
         return
     place = partial(in_scene, scene=context.scene, frame=baked_steps.frame_of(context.scene.softground.ground))
-    import gpu  # noqa: PLC0415  (not there in background)
-
-    gpu.state.blend_set("ALPHA")
-    try:
+    with overlay.blending():
         for step, edit, is_chosen in _outlined(context.scene.softground.ground):
             width = overlay.BOLD_LINE if is_chosen else overlay.LINE
             colour = overlay.SIDES.get(step.side, overlay.SIDES[""])
             overlay.draw_line(place(overlay.closed(step.outline(edit))), colour, width)
-    finally:
-        gpu.state.blend_set("NONE")
 
 
 def draw_numbers() -> None:
@@ -298,18 +295,10 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if context.scene is None or not (state.picking or session.current().step):
         return
-    import blf  # noqa: PLC0415
-    from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
-
-    blf.size(0, overlay.TEXT_SIZE * context.preferences.system.ui_scale)
     ground = context.scene.softground.ground
     for step, edit, _ in _outlined(ground):
         middle = in_scene(step.outline(edit).mean(axis=0), context.scene, baked_steps.frame_of(ground))
-        place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
-        if place is not None:
-            blf.position(0, place.x, place.y, 0)
-            blf.color(0, 1.0, 1.0, 1.0, 1.0)
-            blf.draw(0, f"{step.number}")
+        overlay.draw_number(step.number, middle, WHITE)
     if state.box:
         (x, y), (other_x, other_y) = state.box
         corners = np.array([(x, y, 0), (other_x, y, 0), (other_x, other_y, 0), (x, other_y, 0)], float)

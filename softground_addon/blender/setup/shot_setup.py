@@ -22,6 +22,8 @@ from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
 from ..operator_base import Act, OnGround
+from ..operators.modal_job import Reading, Reports
+from ..operators.panel_base import active_character
 from ..reading import analysis, shots
 from ..rigs import frame_ranges
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, instances_mesh
@@ -29,8 +31,6 @@ from ..sampling.body_sampling import deforms
 from ..sampling.rig_checks import is_animated
 from ..sampling.skin_sampling import meshes_on
 from ..translation import translated
-from .character_editing import active_character
-from .modal_job import Reading, Reports
 
 
 class SOFTGROUND_OT_add_character(Reading):

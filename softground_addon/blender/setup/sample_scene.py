@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from .. import compat, settings
 from ..operator_base import Act
-from . import show_prints
+from ..operators import show_prints
 
 FILE = Path(__file__).with_name("sample_walk.json")
 """Bones, mesh and keys of the figure in plain numbers; `sample_scenes.sample_walk` writes it."""

@@ -13,21 +13,11 @@ from .. import jobs, settings
 from ..characters import character_setup, contact_editing
 from ..characters.import_fixes import mass_of, walk_ahead
 from ..operator_base import Act, Needs
+from ..operators.modal_job import Reading, Reports
+from ..operators.panel_base import RemovesChosen, active_character
 from ..reading import analysis
 from ..rigs.frame_ranges import ancestors
 from ..translation import translated
-from .modal_job import Reading, Reports
-from .panel_base import RemovesChosen, chosen_of
-
-
-def active_character(options: Any) -> Any:
-    """The character that is chosen in the list, or None."""
-    return chosen_of(options, "characters", "active_character")
-
-
-def active_sole(options: Any) -> Any:
-    """The sole that is chosen in the list of the active character, or None."""
-    return chosen_of(active_character(options), "soles", "active_sole")
 
 
 class _OnCharacter(Needs):
