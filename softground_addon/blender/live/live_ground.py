@@ -80,7 +80,7 @@ class LiveGround:
         That the place is in.
     """
 
-    def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> None:
+    def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None) -> None:
         ground = settings.resolve(place.display_mesh)
         self._name = place.display_mesh
         self._vertices, self._places = place.index, Places(*place.position[:, :2].T)
@@ -89,13 +89,12 @@ class LiveGround:
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
         self.take_from(ground)
 
-    def put_on(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> bpy.types.Object:
-        """Show a place that has no prints yet; returns the ground."""
+    def put_on(self, place: Place) -> bpy.types.Object:
+        """Show its place, which has no prints yet; returns the ground."""
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
         empty, ground = np.empty(0, np.intp), settings.resolve(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        up = ground_surface.up_of(ground, unit_scale, frame)
-        ground_mesh.write(ground, empty, nothing, no_prints, up, shape_keys=False)
+        ground_mesh.write(ground, empty, nothing, no_prints, self._up, shape_keys=False)
         shown = place.publish()
         self._name = settings.name_of(shown)
         return shown
