@@ -27,7 +27,6 @@ from .panels import (
     ground_options_panel,
     help,
     menus,
-    overlay_panel,
     panels,
     preset_icons,
     preset_menu,
@@ -36,7 +35,7 @@ from .panels import (
     weather_panel,
 )
 from .reading import analysis
-from .setup import character_editing, cover_object, ground_list, ground_regions, sample_scene, shot_setup
+from .setup import character_editing, cover_object, ground_list, sample_scene, shot_setup
 from .viewport import overlay, step_dragging, step_editing
 from .weather import weather_result
 
@@ -51,7 +50,6 @@ CLASSES = (
     *properties.CLASSES,
     *shot_setup.CLASSES,
     *character_editing.CLASSES,
-    *ground_regions.CLASSES,
     *ground_list.CLASSES,
     *cover_object.CLASSES,
     *give_way.CLASSES,
@@ -71,7 +69,6 @@ CLASSES = (
     *help.CLASSES,
     *import_capture.CLASSES,
     *panels.CLASSES,
-    *overlay_panel.CLASSES,
     *response_panel.CLASSES,
     *ground_options_panel.CLASSES,
     *foot_locks_panel.CLASSES,

@@ -284,4 +284,23 @@ def unregister() -> None:
         bpy.app.timers.unregister(read_again)
 
 
-CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again)
+class SOFTGROUND_PT_overlay(bpy.types.Panel):
+    """Parts of the overlay, among Blender's own"""
+
+    bl_label = "SoftGround"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "HEADER"
+    bl_parent_id = "VIEW3D_PT_overlay"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        panel = session.current()
+        icon = "HIDE_OFF" if panel.show_overlay else "HIDE_ON"
+        layout.operator("softground.overlay", icon=icon, depress=panel.show_overlay)
+        parts = layout.grid_flow(columns=2)
+        parts.active = panel.show_overlay
+        for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
+            parts.prop(panel, part)
+
+
+CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again, SOFTGROUND_PT_overlay)
