@@ -33,9 +33,9 @@ LANGUAGES = ("de_DE", "ja_JP", "zh_HANS")
 _SOURCES = Path(softground_addon.__file__).parent / "blender"
 _KEYWORDS = ("text", "heading", "title")
 """Arguments of layouts that are shown."""
-_CALLS = {"translated": 0, "report": 1, "InputError": 0, "status_text_set": 0}
+_CALLS = {"translated": 0, "say": 0, "report": 1, "InputError": 0, "status_text_set": 0}
 """Functions that are given a text, and the place of it."""
-_REASONS = ("why_no_start", "_why_not")
+_REASONS = ("why_no_start", "missing")
 """Functions that return a text to show."""
 AS_IT_IS = ("SoftGround", "m/s", "[Esc]")
 """Texts that are the same in all languages."""

@@ -26,10 +26,11 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import jobs, setting_paths, settings
+from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import contact_editing
 from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.properties import setting_paths
 from softground_addon.core.record.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")

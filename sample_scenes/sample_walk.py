@@ -16,7 +16,7 @@ from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from softground_addon.blender import compat
-from softground_addon.blender.operators.sample_scene import FILE
+from softground_addon.blender.setup.sample_scene import FILE
 
 FRAMES, RATE = 96, 24
 SHARE = 0.02

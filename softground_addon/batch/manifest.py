@@ -103,26 +103,15 @@ class BatchShot:
     @property
     def options(self) -> list[str]:
         """The bake as options of `softground bake`."""
-        options = [f"--scene={self.scene}"] if self.scene else []
-        if self.preset:
-            options.append(f"--preset={self.preset}")
-        options += [f"--ground={ground}" for ground in self.grounds]
-        if self.frames:
-            options.append(f"--frames={self.frames[0]}-{self.frames[1]}")
-        if self.cell_size is not None:
-            options.append(f"--cell-size={self.cell_size!r}")
-        options += [f"--set={path}={value}" for path, value in self.settings]
-        if self.edits:
-            options.append(f"--edits={self.edits}")
-        if self.response:
-            options.append(f"--response={self.response}")
-        if self.save:
-            options.append(f"--save={self.save}")
-        if self.in_place:
-            options.append("--in-place")
-        if self.report:
-            options.append(f"--report={self.report}")
-        return options
+        given = (
+            *(("scene", self.scene), ("preset", self.preset), *(("ground", ground) for ground in self.grounds)),
+            *(("frames", "{}-{}".format(*self.frames) if self.frames else ""), ("cell-size", self.cell_size)),
+            *(("set", f"{path}={value}") for path, value in self.settings),
+            *(("edits", self.edits), ("response", self.response), ("save", self.save)),
+        )
+        options = [f"--{name}={value}" for name, value in given if value not in ("", None)]
+        in_place = ["--in-place"] if self.in_place else []
+        return [*options, *in_place, *([f"--report={self.report}"] if self.report else [])]
 
 
 def load(path: Path) -> tuple[BatchShot, ...]:

@@ -31,7 +31,7 @@ def apply_preset(options: Any, preset: Preset) -> None:
 
 def as_preset(options: Any, name: str, source: str = "") -> Preset:
     """The scene's ground as a preset of that name."""
-    material = material_of(options)
+    material = material_of(options.material)
     scale = typed(options.length_scale)
     return Preset(
         name,

@@ -93,7 +93,7 @@ def choose(ground: bpy.types.Object | None, slot: int | str, preset: str) -> Non
     material.softground_preset = preset
 
 
-def regions_of(ground: bpy.types.Object, length_scale: float = 1.0) -> tuple[RegionSettings, ...]:
+def regions_of(ground: bpy.types.Object, length_scale: float) -> tuple[RegionSettings, ...]:
     """Slots of a ground that name a preset; those of one that is not there have no material.
 
     Parameters

@@ -54,9 +54,9 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
-        _follow_deletion(scene)
+        _follow_deletion(scene.softground)
         if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
-            _follow_weather_keys(scene)
+            _follow_weather_keys(scene.softground)
             for copy in [update.id.original for update in depsgraph.updates if update.is_updated_geometry]:
                 if isinstance(copy, bpy.types.Object):
                     weather_keys.follow(copy)
@@ -72,17 +72,17 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         _later(compare_prediction)
 
 
-def _follow_deletion(scene: Any) -> None:
-    if scene.softground.printed:
-        bake_report.forget_deleted(scene.softground)
-    for ground in settings.listed_grounds(scene.softground) if state.live is None else ():
+def _follow_deletion(options: Any) -> None:
+    if options.printed:
+        bake_report.forget_deleted(options)
+    for ground in settings.listed_grounds(options) if state.live is None else ():
         is_deleted = baked_ground.is_deleted(ground)
         for belongs in (debris_object.BELONGS, marks_object.BELONGS):
             belongs.follow(ground, is_deleted=is_deleted)
 
 
-def _follow_weather_keys(scene: Any) -> None:
-    for ground in settings.listed_grounds(scene.softground):
+def _follow_weather_keys(options: Any) -> None:
+    for ground in settings.listed_grounds(options):
         weather_keys.follow(baked_ground.display_mesh_of(ground))
 
 
@@ -108,7 +108,7 @@ def begin_render(scene: Any = None, *_: Any) -> None:
     if state.live is not None:
         live.rendering(True)
     if scene is not None:
-        _follow_weather_keys(scene)
+        _follow_weather_keys(scene.softground)
 
 
 @persistent
@@ -133,8 +133,9 @@ def after_undo(*_: Any) -> None:
         analysis.look_again()
     if state.live is not None:
         live.after_undo()
-    _follow_deletion(bpy.context.scene)
-    _follow_weather_keys(bpy.context.scene)
+    options = settings.options_of(bpy.context)
+    _follow_deletion(options)
+    _follow_weather_keys(options)
 
 
 @persistent

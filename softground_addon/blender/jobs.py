@@ -7,8 +7,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ..core.numerics.slices import Slices
-
 Result = TypeVar("Result")
 State = TypeVar("State")
 
@@ -94,7 +92,7 @@ def counted(
     return watched.result
 
 
-def meanwhile(state: State, slices: Slices[Result]) -> Generator[State, None, Result]:
+def meanwhile(state: State, slices: Generator[object, None, Result]) -> Generator[State, None, Result]:
     """A computation that knows nothing of Blender, in slices; before each, the job yields the same state."""
     with closing(slices):
         while True:

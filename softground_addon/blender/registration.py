@@ -14,27 +14,19 @@ from .importing import import_capture
 from .operators import (
     add_weather,
     bake_result,
-    character_editing,
-    cover_object,
     give_way,
-    ground_list,
-    ground_regions,
-    hard_ground,
     live_footprints,
     modal_bake,
     modal_job,
     prediction,
-    sample_scene,
     show_prints,
 )
-from .operators import shot_setup as operators
 from .output import event_points, export_formats, force_curves, make_sound
 from .panels import (
     foot_locks_panel,
     ground_options_panel,
     help,
     menus,
-    overlay_panel,
     panels,
     preset_icons,
     preset_menu,
@@ -43,6 +35,7 @@ from .panels import (
     weather_panel,
 )
 from .reading import analysis
+from .setup import character_editing, cover_object, ground_list, sample_scene, shot_setup
 from .viewport import overlay, step_dragging, step_editing
 from .weather import weather_result
 
@@ -55,11 +48,9 @@ _SETTINGS: tuple[tuple[Any, type], ...] = (
 CLASSES = (
     *session.CLASSES,
     *properties.CLASSES,
-    *operators.CLASSES,
+    *shot_setup.CLASSES,
     *character_editing.CLASSES,
-    *ground_regions.CLASSES,
     *ground_list.CLASSES,
-    *hard_ground.CLASSES,
     *cover_object.CLASSES,
     *give_way.CLASSES,
     *sample_scene.CLASSES,
@@ -78,7 +69,6 @@ CLASSES = (
     *help.CLASSES,
     *import_capture.CLASSES,
     *panels.CLASSES,
-    *overlay_panel.CLASSES,
     *response_panel.CLASSES,
     *ground_options_panel.CLASSES,
     *foot_locks_panel.CLASSES,

@@ -86,7 +86,7 @@ def _set_for(options: Any, units: SceneUnits, ground: bpy.types.Object | None, g
     return {
         "preset": material.preset,
         "surface": material.surface,
-        "material": _material(material),
+        "material": material_of(material),
         "painted": (painted.stiffness, painted.layer_depth, painted.rim),
         "weather": _calm(options, material.surface, units) if options.steps_feel_weather else None,
         "regions": ground_slots.regions_of(ground, typed(options.length_scale)) if ground else (),
@@ -117,12 +117,8 @@ def typed(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def material_of(options: Any) -> GroundMaterial:
-    """The scene's ground material as the core's type."""
-    return _material(options.material)
-
-
-def _material(values: Any) -> GroundMaterial:
+def material_of(values: Any) -> GroundMaterial:
+    """The settings of a ground's material as the core's type."""
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_mesh
 
 
 def heights(ground, key="Basis"):
@@ -22,6 +22,11 @@ def rest(ground):
     ground.data.attributes[ground_mesh.REST].data.foreach_get("vector", points)
     matrix = np.array(ground.matrix_world)
     return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def steps_on(ground):
+    """The steps of a ground's bake that left a print."""
+    return [step for step in baked_ground.record_of(ground).steps if step.footprint]
 
 
 def bake(scene, **values):

@@ -21,11 +21,12 @@ from ...core.files import files, report
 from ...core.ground import presets
 from ...core.record import edits as step_edits
 from ...core.record.archive import LARGEST_TEXT
-from .. import further_grounds, ground_presets, jobs, setting_paths, settings
+from .. import further_grounds, ground_presets, jobs, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters import selection
 from ..output import export_formats
 from ..preset_files import user_folder
+from ..properties import setting_paths
 from ..remedies import said
 from ..response import response_job
 from . import cli_arguments, program
@@ -140,8 +141,7 @@ def _batch_code(outcomes: Sequence[command.Outcome]) -> int:
 def _bake(options: argparse.Namespace) -> None:
     if not (options.save or options.in_place or options.report or options.dry_run):
         raise InputError("Nothing would be kept: give --save FILE.blend, --in-place, --report FILE.json or --dry-run.")
-    if options.blend is not None:
-        _open(options.blend)
+    _open(options.blend)
     read = receipts.checksums(files_read(options)) if options.receipt else {}
     scene = _scene(options.scene)
     target = save_target(options)
@@ -159,7 +159,7 @@ def _bake(options: argparse.Namespace) -> None:
         setting_paths.assign(scene.softground, path, value)
     if options.response and not scene.softground.grounding.use:
         scene.softground.sink_feet = True
-    show = _ending_with(options.parent, _PROGRESS[options.progress])
+    show = _ending_with(options.parent, _PROGRESS.get(options.progress))
     result = jobs.run(bake_job.bake(scene, write=not options.dry_run, edits=edits), show)
     if options.response == "keys" and not options.dry_run and response_job.has_layers(scene.softground):
         for made in jobs.run(make_keys.make_keys(scene)):
@@ -176,8 +176,7 @@ def _bake(options: argparse.Namespace) -> None:
 def _clean(options: argparse.Namespace) -> None:
     if not (options.save or options.in_place or options.report):
         raise InputError("Nothing would be kept: give --save FILE.blend, --in-place or --report FILE.json.")
-    if options.blend is not None:
-        _open(options.blend)
+    _open(options.blend)
     scene = _scene(options.scene)
     target = save_target(options)
     check_places(options, target)
@@ -200,8 +199,7 @@ def _clean(options: argparse.Namespace) -> None:
 
 
 def _export(options: argparse.Namespace) -> None:
-    if options.blend is not None:
-        _open(options.blend)
+    _open(options.blend)
     scene = _scene(options.scene)
     kind = options.format.upper().replace("-", "_")
     asked = options.output.absolute() if options.output else export_formats.default_path(scene.softground.ground, kind)
@@ -209,28 +207,19 @@ def _export(options: argparse.Namespace) -> None:
     start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
     if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:
         raise InputError(f"--resolution takes a number from 1 to {export_formats.LARGEST_IMAGE}.")
-    how = export_formats.Options(
-        kind,
-        path,
-        start,
-        end,
-        options.resolution,
-        options.uv_map,
-        options.outdated,
-        options.samples,
-        options.stereo,
-    )
-    for written in export_formats.export(scene, how):
+    how = {name: getattr(options, name) for name in ("resolution", "uv_map", "outdated", "samples", "stereo")}
+    for written in export_formats.export(scene, export_formats.Options(kind, path, start, end, **how)):
         print(written, flush=True)
 
 
-def _ending_with(parent: int, show: Callable[[jobs.Progress], None]) -> Callable[[jobs.Progress], None]:
+def _ending_with(parent: int, show: Callable[[jobs.Progress], None] | None) -> Callable[[jobs.Progress], None]:
     """Show progress while the parent process of that id lives, and end with it; 0 is none. Only shows on Windows."""
 
     def shown(progress: jobs.Progress) -> None:
         if parent and os.name == "posix" and os.getppid() != parent:
             _interrupt(0, None)
-        show(progress)
+        if show:
+            show(progress)
 
     return shown
 
@@ -260,7 +249,10 @@ def _write_results(
             receipt.write_bytes(content_of_receipt.encode())
 
 
-def _open(path: Path) -> None:
+def _open(path: Path | None) -> None:
+    """Open a shot; without one, that which Blender has opened is meant."""
+    if path is None:
+        return
     if not path.is_file():
         raise InputError(f"There is no file '{path}'.")
     try:
@@ -314,12 +306,8 @@ def _choose_grounds(scene: bpy.types.Scene, texts: Sequence[str]) -> None:
 
 
 def _preset(name_or_path: str) -> presets.Preset:
-    path = Path(name_or_path)
-    return (
-        presets.load(path)
-        if path.suffix.lower() == ".json"
-        else presets.find(name_or_path, (presets.FOLDER, user_folder()))
-    )
+    path, folders = Path(name_or_path), (presets.FOLDER, user_folder())
+    return presets.load(path) if path.suffix.lower() == ".json" else presets.find(name_or_path, folders)
 
 
 def _batch_shot(options: argparse.Namespace, target: Path | None) -> manifest.BatchShot:
@@ -363,13 +351,4 @@ def _openjd(progress: jobs.Progress) -> None:
     print(f"openjd_progress: {progress.overall * 100:.1f}\nopenjd_status: {progress.stage}", flush=True)
 
 
-def _none(_progress: jobs.Progress) -> None:
-    pass
-
-
-_PROGRESS: dict[str, Callable[[jobs.Progress], None]] = {
-    "plain": _Plain(),
-    "json": _json,
-    "openjd": _openjd,
-    "none": _none,
-}
+_PROGRESS: dict[str, Callable[[jobs.Progress], None]] = {"plain": _Plain(), "json": _json, "openjd": _openjd}

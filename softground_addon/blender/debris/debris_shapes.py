@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
-from ...core.ground.crumbs import lumps
 from ...core.ground.surfaces import SurfaceRecord
+from ...core.meshing.crumbs import lumps
 from ..compat import shader_tree
 from .debris_nodes import MARK
 

@@ -300,17 +300,6 @@ def events_in_frame(ground: bpy.types.Object, bake_record: record.BakeRecord) ->
     return rows
 
 
-def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
-    """The steps of a ground's bake that left a print.
-
-    Raises
-    ------
-    InputError
-        If there is no bake, or its record is damaged or no longer fits the mesh.
-    """
-    return [step for step in record_of(ground).steps if step.footprint]
-
-
 def edits_of(ground: bpy.types.Object, characters: Sequence[CharacterSettings] = ()) -> Mapping[str, StepEdit]:
     """The artist's edits of the steps of a ground's bake, by step id; none if no bake can be read.
 

@@ -32,6 +32,9 @@ COARSEST = 0.4
 """Side of the largest faces, far from the trail [m]: what follows vertices, such as paint, still has some. Larger only
 where so many would exceed `MAX_GRID_VERTICES`, as between characters that are kilometres apart."""
 
+SOFT_EDGE = 0.5
+"""Part of its margin over which a ground ends softly."""
+
 BLUR_REACH = 3.0
 """Cut-off of the display blur [standard deviations]."""
 
@@ -85,12 +88,7 @@ def created(drafts: ExitStack, wanted: BakeSettings, layout: Layout) -> Slices[O
     """A draft of a ground that is laid out; its material is there."""
     drafts.enter_context(drafted(wanted.surface))
     yield
-    return (yield from draft.slices(drafts, layout, soft_edge(wanted.margin_m)))
-
-
-def soft_edge(margin: float) -> float:
-    """Width of the edge over which a ground with some margin ends softly [m]."""
-    return margin / 2
+    return (yield from draft.slices(drafts, layout, SOFT_EDGE * wanted.margin_m))
 
 
 def reach_of(material: GroundMaterial) -> float:

@@ -92,7 +92,7 @@ def terrain_of(
 
 
 @sliced
-def hard_part(surface: GroundSurface | None, bounds: Array | None = None) -> Slices[list[MeshTerrain]]:
+def hard_part(surface: GroundSurface | None, bounds: Array | None) -> Slices[list[MeshTerrain]]:
     """A ground's surface where it is hard; none where it is not, within bounds in the plane [m]."""
     if surface is None or surface.kinds is None or not (hard := surface.kinds == HARD).any():
         return []

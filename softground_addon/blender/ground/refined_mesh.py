@@ -14,6 +14,7 @@ from ...core.meshing.face_edges import face_edges
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
+from ...core.numerics.triangles import enumerated
 from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
@@ -139,7 +140,8 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
     """
     unrefined = refinement.kept_faces
     size = np.diff(surface.face_start)
-    kept_corners = _runs(surface.face_start[unrefined], size[unrefined])
+    face, corner = enumerated(size[unrefined])
+    kept_corners = surface.face_start[unrefined][face] + corner
     corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.corner_vertex])
     kept_start = np.cumsum(size[unrefined]) - size[unrefined]
     face_start = np.concatenate([kept_start, len(kept_corners) + refinement.face_start[:-1]])
@@ -237,11 +239,6 @@ def _copy_choices(mesh: bpy.types.Mesh, carried: Carried) -> None:
     for choice, wanted in carried.colours.items():
         if wanted in names:
             setattr(colours, choice, names.index(wanted))
-
-
-def _runs(start: Indices, count: Indices) -> Indices:
-    """For starts (5, 9) and counts (2, 3): 5, 6, 9, 10, 11."""
-    return np.repeat(start - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
 
 
 def _values(attribute: Any) -> NDArray[Any]:

@@ -41,7 +41,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
         return
     if depsgraph is not None and depsgraph.mode == "RENDER":
         return
-    if not state.live.follow(scene):
+    if not state.live.follow():
         _lose_grounds()
 
 
@@ -61,7 +61,7 @@ def rendering(active: bool) -> None:
 def after_undo() -> None:
     """Handle an undo or redo: the mesh is replaced; live mode goes on if the new one is its own."""
     scene = _scene()
-    if state.live is not None and (scene is None or not state.live.show_anew(scene)):
+    if state.live is not None and (scene is None or not state.live.show_anew()):
         grounds = settings.listed_grounds(scene.softground) if scene else []
         if any(map(baked_ground.has_remains, grounds)):
             _lose_grounds()
@@ -83,9 +83,9 @@ def answer(seconds: float | None = None) -> float | None:
     try:
         waited = time.perf_counter() - state.live.answered_at
         part = min(max(waited, PART), LONGEST_PART) if seconds is None else seconds
-        if state.live.answer(scene, part):
+        if state.live.answer(part):
             return PAUSE
-        return LOOK if state.live.has_more(scene) else None
+        return LOOK if state.live.has_more() else None
     except InputError as error:
         forget(said(error))
     return None
@@ -101,13 +101,13 @@ def watch() -> None:
 def is_answering() -> bool:
     """True if live mode is on and does not show the present settings yet."""
     scene = _scene()
-    return state.live is not None and scene is not None and state.live.has_more(scene)
+    return state.live is not None and scene is not None and state.live.has_more()
 
 
 def refusal() -> str:
     """Reason why live mode does not press with the present settings, or why it has ended; empty if it does."""
     scene = _scene()
-    return state.live_ended if state.live is None or scene is None else state.live.refusal(scene)
+    return state.live_ended if state.live is None or scene is None else state.live.refusal()
 
 
 def begin(mode: LiveMode) -> None:
@@ -115,8 +115,8 @@ def begin(mode: LiveMode) -> None:
     state.live, state.live_ended = mode, ""
     session.current().is_live = True
     bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
-    if scene := mode.current_scene():
-        mode.follow(scene)  # the frame may have changed meanwhile
+    if mode.current_scene():
+        mode.follow()  # the frame may have changed meanwhile
     watch()
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...core.composers.playhead import Playhead
 from ...core.ground.display_blur import blurred_window, gaussian_kernel
 from ...core.ground.heightfield import HeightField
+from ...core.ground.places import Places
 from ...core.ground.sparse_grid import TILE, Window
 from ...core.motion.ground_frame import GroundFrame
 from ...core.numerics import bilinear
@@ -79,23 +80,21 @@ class LiveGround:
         That the place is in.
     """
 
-    def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> None:
+    def __init__(self, place: Place, unit_scale: float, frame: GroundFrame | None) -> None:
         ground = settings.resolve(place.display_mesh)
         self._name = place.display_mesh
-        self._vertices, self._place = place.index, place.position[:, :2]
+        self._vertices, self._places = place.index, Places(*place.position[:, :2].T)
         self._up = ground_surface.up_of(ground, unit_scale, frame)
-        self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
         self.take_from(ground)
 
-    def put_on(self, place: Place, unit_scale: float, frame: GroundFrame | None = None) -> bpy.types.Object:
-        """Show a place that has no prints yet; returns the ground."""
+    def put_on(self, place: Place) -> bpy.types.Object:
+        """Show its place, which has no prints yet; returns the ground."""
         nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
         empty, ground = np.empty(0, np.intp), settings.resolve(place.display_mesh)
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        up = ground_surface.up_of(ground, unit_scale, frame)
-        ground_mesh.write(ground, empty, nothing, no_prints, up, shape_keys=False)
+        ground_mesh.write(ground, empty, nothing, no_prints, self._up, shape_keys=False)
         shown = place.publish()
         self._name = settings.name_of(shown)
         return shown
@@ -112,7 +111,7 @@ class LiveGround:
 
     def forget_cells(self) -> None:
         """Look up anew which vertices lie in which cells, as their size is another."""
-        self._by_tile, self._known = None, {}
+        self._known = {}
         self._reached = np.empty(0, np.intp)
 
     def object(self, likely: bpy.types.Object | None) -> bpy.types.Object | None:
@@ -167,15 +166,14 @@ class LiveGround:
 
     def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
         """The vertices over a tile, looked up once."""
-        if self._by_tile is None:
-            self._by_tile = _grouped(np.floor(self._place / cell_size).astype(np.int64) // TILE)
         if tile not in self._known:
-            inside = self._by_tile.get(tile, np.empty(0, np.intp))
-            at = self._place[inside] / cell_size - np.array(tile) * TILE + 0.5  # from the centre of the cell before it
+            inside = self._places.within(Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE), cell_size)
+            along, corner_of_tile = self._places.at(inside) / cell_size, np.array(tile) * TILE
+            at = along - corner_of_tile + 0.5  # from the centre of the cell before it
             if np.abs(at - np.rint(at)).max(initial=0.0) < ON_CENTRE:
                 at = np.rint(at)
             corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
-            cell = np.floor(self._place[inside] / cell_size).astype(np.intp) - np.array(tile) * TILE
+            cell = np.floor(along).astype(np.intp) - corner_of_tile
             self._known[tile] = _TileVertices(self._vertices[inside], corner, cell, *(at - corner).T)
             self._reached = np.concatenate([self._reached, self._vertices[inside]])
         return self._known[tile]
@@ -192,15 +190,6 @@ def _write(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None
     """Set an attribute of all vertices (V,)."""
     attribute: Any = mesh.attributes[name]
     attribute.data.foreach_set("value", values)
-
-
-def _grouped(tiles: NDArray[np.int64]) -> dict[Tile, Indices]:
-    """Numbers of the places in each tile."""
-    order = np.lexsort(tiles.T)
-    ordered = tiles[order]
-    borders = np.flatnonzero((np.diff(ordered, axis=0) != 0).any(axis=1)) + 1
-    parts = [part for part in np.split(order, borders) if len(part)]
-    return {(int(tiles[part[0], 0]), int(tiles[part[0], 1])): part for part in parts}
 
 
 def _tiles_of(windows: Sequence[Window], margin: int) -> list[Tile]:

@@ -81,34 +81,40 @@ class LiveMode:
         self._analysis, self._wanted = known, wanted
         self._shares: tuple[analysis.Analysis, list[float], _Shares] | None = None
 
-    def follow(self, scene: bpy.types.Scene) -> bool:
+    def follow(self) -> bool:
         """Show the grounds at the scene's frame; False if one is gone or was changed by somebody else."""
-        shown = self._objects(scene)
+        shown = self._objects()
         if shown is None:
             return False
         if bpy.app.background:  # where there are no timers, and nobody waits
             with suppress(InputError):  # the last reading stays shown
-                self.answer(scene)
+                self.answer()
         for part, obj in zip(self._parts, shown, strict=True):
-            part.go_to(obj, float(scene.frame_current), self._wanted)
+            part.go_to(obj, self._frame(), self._wanted)
         return True
 
-    def _objects(self, scene: bpy.types.Scene | None) -> list[bpy.types.Object] | None:
+    def _listed(self) -> list[bpy.types.Object]:
+        """The grounds of the scene."""
+        scene = self.current_scene()
+        return settings.listed_grounds(scene.softground) if scene else []
+
+    def _objects(self) -> list[bpy.types.Object] | None:
         """What shows the prints of each part; None if any of them is gone."""
-        shown = [obj for obj in (part.object(scene) for part in self._parts) if obj is not None]
+        listed = self._listed()
+        shown = [obj for obj in (part.object(listed) for part in self._parts) if obj is not None]
         return shown if len(shown) == len(self._parts) else None
 
-    def show_anew(self, scene: bpy.types.Scene) -> bool:
+    def show_anew(self) -> bool:
         """Show the grounds at the scene's frame whatever the meshes show at the moment, as after an undo."""
-        shown = self._objects(scene)
+        shown = self._objects()
         if shown is None:
             return False
         self._answering, self._can_start_over = None, True
         for part, obj in zip(self._parts, shown, strict=True):
-            part.show_anew(obj, float(scene.frame_current), self._wanted)
+            part.show_anew(obj, self._frame(), self._wanted)
         return True
 
-    def answer(self, scene: bpy.types.Scene, seconds: float = np.inf) -> bool:
+    def answer(self, seconds: float = np.inf) -> bool:
         """Press again with the present settings and animation, for a while; True if there is more.
 
         The newest steps follow a slider that is dragged: only the work after these begins anew with each setting.
@@ -124,13 +130,14 @@ class LiveMode:
             If the shot cannot be read any more.
         """
         try:
-            return self._answer(scene, time.thread_time() + seconds)
+            return self._answer(time.thread_time() + seconds)
         finally:
             self.answered_at = time.perf_counter()
 
-    def _answer(self, scene: bpy.types.Scene, until: float) -> bool:
+    def _answer(self, until: float) -> bool:
+        scene = self._here()
         asked = settings.snapshot(scene)
-        if self._can_start_over and self._is_another(scene, asked):
+        if self._can_start_over and self._is_another(asked):
             if analysis.known(scene, asked) is None:
                 if self._asked != asked and np.isfinite(until):  # to be read as a whole, but not while it is dragged
                     self._asked = asked
@@ -144,38 +151,37 @@ class LiveMode:
                 return True
         return False
 
-    def has_more(self, scene: bpy.types.Scene) -> bool:
+    def has_more(self) -> bool:
         """True if the ground does not show the present settings yet."""
-        return self._answering is not None or self._is_another(scene, settings.snapshot(scene))
+        return self._answering is not None or self._is_another(settings.snapshot(self._here()))
 
-    def _is_another(self, scene: bpy.types.Scene, asked: BakeSettings) -> bool:
+    def _is_another(self, asked: BakeSettings) -> bool:
         """True if settings or animation differ from those that are being pressed, or were last."""
-        if self._left_out(scene):
+        if self._left_out():
             return False  # other grounds want another live mode
-        if self._refused and self._refused[0] == asked and analysis.known(scene, asked) is self._refused[1]:
+        known = analysis.known(self._here(), asked)
+        if self._refused and self._refused[0] == asked and known is self._refused[1]:
             return False
-        if self._answering is None and analysis.known(scene, asked) is not self._analysis:
+        if self._answering is None and known is not self._analysis:
             return True
         last = self._wanted if self._answering is None else self._asked
         return last is None or (asked != last and _pressed_by(asked) != _pressed_by(last))
 
-    def _left_out(self, scene: bpy.types.Scene) -> str:
+    def _left_out(self) -> str:
         """Name of a part that is not among the grounds of its scene any more; empty where all are."""
-        listed = {ground.session_uid for ground in settings.grounds_of(scene.softground)}
+        listed = {ground.session_uid for ground in settings.grounds_of(self._here().softground)}
         return next((part.owner.name for part in self._parts if part.owner.uid not in listed), "")
 
-    def refusal(self, scene: bpy.types.Scene) -> str:
+    def refusal(self) -> str:
         """Reason why the present settings are not pressed; empty if they are, or were not tried."""
-        if name := self._left_out(scene):
+        if name := self._left_out():
             return translated("'{name}' is not among the grounds any more: list it again, or end live mode", name=name)
         refused = self._refused
-        return refused[2] if refused and refused[0] == settings.snapshot(scene) else ""
+        return refused[2] if refused and refused[0] == settings.snapshot(self._here()) else ""
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
         """Press the shot up to the frame that is shown: the newest steps onto the present ground, then all of them."""
-        scene = self.current_scene()
-        assert scene is not None
-        known = yield from _in_steps(analysis.refreshing(scene))
+        known = yield from jobs.meanwhile(None, analysis.refreshing(self._here()))
         if known is None:
             raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
@@ -192,7 +198,7 @@ class LiveMode:
                 return
             if self._parts[0].playhead.ground.cell_size == asked.cell_size_m:
                 for part, number in zip(self._parts, numbers, strict=True):
-                    yield from part.pressing_newest(self.current_scene(), asked, known.shot, shares[number])
+                    yield from part.pressing_newest(self._listed, asked, known.shot, shares[number])
             self._can_start_over = True
             wholes = [self._begun(*each, known, asked, shares) for each in zip(self._parts, numbers, strict=True)]
             for whole in wholes:
@@ -202,7 +208,7 @@ class LiveMode:
                 whole.go_to(self._frame())
         self._analysis, self._wanted, self._refused = known, asked, None
         for part, whole in zip(self._parts, wholes, strict=True):
-            part.take_over(whole, part.object(self.current_scene()), asked)
+            part.take_over(whole, part.object(self._listed()), asked)
 
     def _shared(self, known: analysis.Analysis, asked: BakeSettings) -> Generator[None, None, _Shares]:
         """What of the loads each ground bears, which is looked up once for a shot: no slider waits for it."""
@@ -235,6 +241,11 @@ class LiveMode:
         """The scene, which may be another one after an undo."""
         return next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
 
+    def _here(self) -> bpy.types.Scene:
+        scene = self.current_scene()
+        assert scene is not None
+        return scene
+
     def _frame(self) -> float:
         scene = self.current_scene()
         return float(scene.frame_current) if scene else -np.inf
@@ -244,7 +255,7 @@ class LiveMode:
         touching = [contact for part in self._parts for contact in part.playhead.in_contact()]
         return touching, self._parts[0].playhead.ground.cell_size, self._wanted.material.rim_reach
 
-    def keeping(self, scene: bpy.types.Scene) -> jobs.Job[None]:
+    def keeping(self) -> jobs.Job[None]:
         """Keep the grounds as shown: as the bake of the frames up to now, with the settings that pressed them.
 
         Raises
@@ -255,17 +266,17 @@ class LiveMode:
         self._check_writable()
         now = jobs.Progress("simulate", 0.0)
         with suppress(InputError):  # then the last ground is kept
-            if self.has_more(scene):
-                yield from analysis.reading(scene)
-            while self.answer(scene, PART):
+            if self.has_more():
+                yield from analysis.reading(self._here())
+            while self.answer(PART):
                 yield now
-        shown = self._objects(scene)
+        shown = self._objects()
         if shown is None:
             return
         names, shot = [settings.name_of(obj) for obj in shown], self._analysis.shot
-        made_with = self._kept_with(settings.snapshot(scene))
+        made_with = self._kept_with(settings.snapshot(self._here()))
         of_each = [made_with.of_each_ground[part.number_in(made_with)] for part in self._parts]
-        movers = [staleness.of_movers(scene.objects, each) for each in of_each]
+        movers = [staleness.of_movers(self._here().objects, each) for each in of_each]
         pressed = []
         for part in self._parts:
             loads = part.playhead.loads_by_now()
@@ -290,7 +301,7 @@ class LiveMode:
                 continue
             published = (yield from job[0]) if len(writing) == 1 else jobs.run(job[0])
             sign(published, each, moved, summary=bake_report.summary_of_prints(job[1]) | baked_at)
-        bake_report.note_prints(scene.softground)
+        bake_report.note_prints(self._here().softground)
 
     def _kept_with(self, asked: BakeSettings) -> BakeSettings:
         """Settings of the bake that is kept, with the present ones of what does not press."""
@@ -339,17 +350,6 @@ class LiveMode:
 
 
 _ENDED = object()
-
-
-def _in_steps(job: jobs.Job[jobs.Result]) -> Generator[None, None, jobs.Result]:
-    """A job without its progress."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as end:
-            result: jobs.Result = end.value
-            return result
-        yield
 
 
 def _not_shown(shares: _Shares, followed: Sequence[int]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -41,9 +41,8 @@ class LivePart:
         """Number of the ground among all of some settings, which have it."""
         return [name.uid for name in wanted.soft_grounds].index(self.owner.uid)
 
-    def object(self, scene: bpy.types.Scene | None) -> bpy.types.Object | None:
-        """What shows the prints; None if it is gone or no longer as live mode made it."""
-        listed = settings.listed_grounds(scene.softground) if scene else []
+    def object(self, listed: Iterable[bpy.types.Object]) -> bpy.types.Object | None:
+        """What shows the prints, of the listed grounds; None if it is gone or no longer as live mode made it."""
         ground = next((each for each in listed if each.session_uid == self.owner.uid), None)
         return self.ground.object(ground and baked_ground.display_mesh_of(ground))
 
@@ -67,9 +66,13 @@ class LivePart:
         self.show(obj, self.playhead.ground.tile_windows(), wanted)
 
     def pressing_newest(
-        self, scene: bpy.types.Scene | None, asked: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
+        self,
+        listed: Callable[[], Iterable[bpy.types.Object]],
+        asked: BakeSettings,
+        shot: Shot,
+        loads: Sequence[CharacterLoads],
     ) -> Generator[None]:
-        """Show the newest steps as they will be; nothing where they are most of the shot."""
+        """Show the newest steps as they will be, on a ground that is still listed; nothing where they are most."""
         since, shown = self.playhead.before_newest(), self.playhead.frame
         if since - self.playhead.first_frame < shown - since:
             return
@@ -78,7 +81,7 @@ class LivePart:
         newest = self.playhead.pressed_anew(since, loads, ground_of(made_with, part))
         while newest.advance(shown):
             yield
-        if obj := self.object(scene):
+        if obj := self.object(listed()):
             changed = [*self.playhead.changed_since(since), *newest.changed_since(since)]
             sigma = made_with.material.blur_sigma
             self.ground.show(obj, newest, [*changed, *self.drawn_over], sigma, asked.frame_rate)

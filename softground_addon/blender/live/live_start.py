@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -18,8 +19,9 @@ from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
 from ...core.motion.motion import shortest_sole
-from ...core.numerics.arrays import Array, Mask
+from ...core.numerics.arrays import Array, Indices, Mask
 from ...core.numerics.cell_keys import among, cells_at, keys_at
+from ...core.numerics.slices import Slices
 from ...core.settings import BakeSettings
 from .. import settings
 from ..baking import bake_report
@@ -95,7 +97,7 @@ def _put_on(
     place: baked_ground.Place, ground: LiveGround, playhead: Playhead, *, made_with: BakeSettings
 ) -> bpy.types.Object:
     """Show a ground in its scene; what shows it."""
-    shown = ground.put_on(place, made_with.unit_scale_m, made_with.frame)
+    shown = ground.put_on(place)
     ground.show(shown, playhead, (), made_with.material.blur_sigma, made_with.frame_rate)
     return shown
 
@@ -109,46 +111,46 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
         If the ground is too coarse and is to stay so.
     """
     cell_size, unit_scale, detail, frame = wanted.cell_size_m, wanted.unit_scale_m, wanted.detail, wanted.frame
+    placing = partial(meanwhile, PLACING)
 
     def is_near(x: Array, y: Array) -> Mask:
         low, high = shot.lower, shot.upper
         return np.asarray((x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1]))
 
+    def pressed(vertices: Array, covers: Callable[[Array, Array], Mask]) -> Slices[Indices]:
+        return ground_surface.pressed_vertices.slices(vertices, covers, shot.terrain)
+
     if wanted.ground is None:
         assert shot.plan is not None
-        layout = yield from meanwhile(PLACING, created_ground.laid_out.slices(wanted, shot.plan))
-        name = yield from meanwhile(PLACING, created_ground.created(drafts, wanted, layout))
-        looking = ground_surface.pressed_vertices.slices(layout.vertices, is_near, shot.terrain)
-        index = yield from meanwhile(PLACING, looking)
+        layout = yield from placing(created_ground.laid_out.slices(wanted, shot.plan))
+        name = yield from placing(created_ground.created(drafts, wanted, layout))
+        index = yield from placing(pressed(layout.vertices, is_near))
         return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 
     name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
     if vertices is None:  # it was made for the shot
         vertices = ground_surface.rest_vertices(settings.resolve(name), unit_scale, frame)
-    plan = shot.plan or (yield from meanwhile(PLACING, plan_ground.slices(shot.motions)))
+    plan = shot.plan or (yield from placing(plan_ground.slices(shot.motions)))
     if plan.footfalls is not None:
         footfalls = cells_at(plan.footfalls, cell_size)
-        covering = coverage.slices(vertices, slice(None), footfalls, cell_size)
-        cover = yield from meanwhile(PLACING, covering)
+        cover = yield from placing(coverage.slices(vertices, slice(None), footfalls, cell_size))
         ground = settings.resolve(name)
 
         def is_under(x: Array, y: Array) -> Mask:
             return among(footfalls, keys_at(np.stack([x, y], axis=-1), cell_size))
 
-        under = yield from meanwhile(PLACING, ground_surface.pressed_vertices.slices(vertices, is_under, shot.terrain))
+        under = yield from placing(pressed(vertices, is_under))
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
             ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail, frame=frame
         ):
             reading = trail_detail.coarsest.slices(name, shot.surface, unit_scale, cell_size, frame)
-            coarse, level = yield from meanwhile(PLACING, reading)
+            coarse, level = yield from placing(reading)
             region = trail_detail.region_around(footfalls, cell_size, created_ground.reach_of(wanted.material))
-            refinement = yield from meanwhile(PLACING, refine.slices(coarse, region, cell_size))
+            refinement = yield from placing(refine.slices(coarse, region, cell_size))
             drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)
-            drafted = yield from meanwhile(PLACING, drafting)
+            drafted = yield from placing(drafting)
             vertices = refinement.at_vertices(coarse, coarse.vertices)
-            looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
-            index = yield from meanwhile(PLACING, looking)
+            index = yield from placing(pressed(vertices, is_near))
             return baked_ground.on_detail(settings.resolve(name), settings.resolve(drafted), index, vertices)
-    looking = ground_surface.pressed_vertices.slices(vertices, is_near, shot.terrain)
-    index = yield from meanwhile(PLACING, looking)
+    index = yield from placing(pressed(vertices, is_near))
     return baked_ground.on_itself(settings.resolve(name), index, vertices)

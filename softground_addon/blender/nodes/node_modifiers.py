@@ -53,6 +53,24 @@ def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:
     )
 
 
+def put(obj: bpy.types.Object, name: str, group: bpy.types.NodeTree, place: int) -> Any:
+    """A new modifier that runs a group, at a place among an object's; the one that is active stays so."""
+    active = obj.modifiers.active
+    modifier: Any = obj.modifiers.new(name, "NODES")
+    modifier.node_group, modifier.show_in_editmode = group, False
+    obj.modifiers.move(len(obj.modifiers) - 1, place)
+    if active:
+        obj.modifiers.active = active
+    return modifier
+
+
+def showing(ground: bpy.types.Object) -> set[bpy.types.Object]:
+    """A ground and the copies of it that show the same mesh."""
+    shared: Any = ground.data
+    copies = [obj for obj in bpy.data.objects if obj.data == shared] if shared.users > 1 else []
+    return {ground, *copies}
+
+
 def inputs_of(modifier: Any) -> dict[str, str]:
     """Identifier of each input of a modifier's node group, by its name."""
     sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]

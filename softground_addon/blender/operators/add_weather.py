@@ -8,9 +8,8 @@ from bpy.props import EnumProperty
 from ...core.errors import InputError
 from .. import jobs, session, settings
 from ..ground import baked_ground, ground_checks
-from ..operator_base import OnBake, reports_errors
+from ..operator_base import Act, OnBake
 from ..playback import weather_inputs, weather_modifier
-from ..translation import translated
 from ..weather import ground_weather as weather
 from ..weather import weather_result
 from .modal_job import Reading, Reports
@@ -31,11 +30,6 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
 
     preset: EnumProperty(name="Preset", description="Weather to start with", items=_CHOICES, default=NONE)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is a bake, and no other job runs."""
-        return super().poll(context) and Reading.poll.__func__(cls, context)
-
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         if session.current().is_live:
             raise InputError("Live mode is on, and weather acts on prints that stay: press Keep, then add weather.")
@@ -48,26 +42,22 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
         return []
 
 
-class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
+class SOFTGROUND_OT_remove_weather(Act):
     """Remove the weather from the ground; the bake stays as it is"""
 
     bl_idname = "softground.remove_weather"
     bl_label = "Remove Weather"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is weather on the scene's ground."""
+    def missing(cls, context: bpy.types.Context) -> str:
         ground = settings.options_of(context).ground
-        cls.poll_message_set(translated("There is no weather on the ground"))
-        return ground is not None and weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) is not None
+        has_weather = ground is not None and weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+        return "" if has_weather else "There is no weather on the ground"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         ground = settings.options_of(context).ground
         ground_checks.check_playable(baked_ground.display_mesh_of(ground))
         weather.remove(ground)
-        return {"FINISHED"}
 
 
 CLASSES = (SOFTGROUND_OT_add_weather, SOFTGROUND_OT_remove_weather)

@@ -14,9 +14,9 @@ from .. import session, settings
 from ..baking import bake_report
 from ..characters import character_setup
 from ..ground import baked_ground, ground_mesh
-from ..operator_base import OnBake
+from ..operator_base import Act, OnBake
 from ..translation import translated
-from .character_editing import active_character
+from .panel_base import active_character
 
 
 def draw(layout: Any, options: Any, summary: Any) -> None:
@@ -57,7 +57,7 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     box.operator("softground.sink_feet", text="Sink Feet Now", icon="TRIA_DOWN_BAR")
 
 
-class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_show_warnings(OnBake, Act):
     """Show what the bake found, and what to do about it"""
 
     bl_idname = "softground.show_warnings"
@@ -73,10 +73,9 @@ class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
         context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         for warning in warnings_of(settings.scene_of(context).softground.ground):
             self.report({"WARNING"}, warning)
-        return {"FINISHED"}
 
 
 def _draw_warnings(menu: Any, context: bpy.types.Context) -> None:

@@ -37,15 +37,12 @@ class SOFTGROUND_OT_give_way(Reading):
     kind: EnumProperty(name="Kind", description="What gives way", items=KINDS, default="MEADOW")
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if the scene has a ground and the active object may give way: a redraw looks at no other."""
-        if not super().poll(context):
-            return False
-        cls.poll_message_set(translated("Choose a ground, and select plants or litter on it"))
-        ground, active = settings.options_of(context).ground, context.active_object
-        if ground is None or active is None or not active.select_get() or context.mode != "OBJECT":
-            return False
-        return _may_give_way(active, ground)
+    def missing(cls, context: bpy.types.Context) -> str:
+        ground, active = settings.options_of(context).ground, context.active_object  # a redraw looks at no other object
+        is_selected = ground is not None and active is not None and active.select_get() and context.mode == "OBJECT"
+        if not is_selected or not _may_give_way(active, ground):
+            return "Choose a ground, and select plants or litter on it"
+        return super().missing(context)
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         ground = scene.softground.ground
@@ -87,9 +84,9 @@ def renew_table(ground: bpy.types.Object) -> None:
     trampled_ground.write(ground, made, units)
 
 
-def _may_give_way(obj: bpy.types.Object, ground: bpy.types.Object) -> bool:
+def _may_give_way(obj: bpy.types.Object | None, ground: bpy.types.Object) -> bool:
     """True of plants and litter; of a ground only with a scatter of its own."""
-    if obj.type not in give_way.SCATTERS:
+    if obj is None or obj.type not in give_way.SCATTERS:
         return False
     is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
     return not is_ground or any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
@@ -103,13 +100,11 @@ class SOFTGROUND_OT_add_sample_meadow(Reading):
     bl_label = "Add Sample Meadow"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if the scene has a ground."""
-        if not super().poll(context):
-            return False
-        cls.poll_message_set(translated("Choose or create a ground first"))
+    def missing(cls, context: bpy.types.Context) -> str:
         ground = settings.options_of(context).ground
-        return ground is not None and ground.type == "MESH" and context.mode == "OBJECT"
+        if ground is None or ground.type != "MESH" or context.mode != "OBJECT":
+            return "Choose or create a ground first"
+        return super().missing(context)
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         name = settings.name_of(scene.softground.ground)

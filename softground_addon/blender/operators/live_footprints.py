@@ -30,12 +30,10 @@ class SOFTGROUND_OT_live(ModalJob):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if live mode can start or end; otherwise the button says what is missing."""
-        reason = _why_not(context)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def missing(cls, context: bpy.types.Context) -> str:
+        if live.is_on():
+            return BUSY if session.current().is_baking else ""
+        return why_no_start(context) or live_start.bake_in_the_way(settings.options_of(context))
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
@@ -54,7 +52,7 @@ class SOFTGROUND_OT_live(ModalJob):
         if state.live is None:
             return (yield from live_start.starting(scene))
         if self.keep:
-            yield from state.live.keeping(state.live.current_scene() or scene)
+            yield from state.live.keeping()
             live.forget()
         else:
             live.discard()
@@ -67,15 +65,6 @@ class SOFTGROUND_OT_live(ModalJob):
         if result is not None:
             live.begin(result)
         session.redraw()
-
-
-def _why_not(context: bpy.types.Context) -> str:
-    """Reason why live mode can neither start nor end, or an empty text."""
-    if live.is_on():
-        return translated(BUSY) if session.current().is_baking else ""
-    if reason := why_no_start(context):
-        return translated(reason)
-    return live_start.bake_in_the_way(settings.options_of(context))
 
 
 CLASSES = (SOFTGROUND_OT_live,)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar
 
 import bpy
 
 from .. import jobs, session, settings
 from ..baking import bake_job, clean_feet, make_keys, root_motion, sink_feet
-from ..reading import analysis
 from ..translation import translated
 from . import prediction, show_prints
 from .modal_job import STAGE_NAMES, ModalJob, why_no_start
@@ -19,17 +17,9 @@ class _Bake(ModalJob):
     """Base of operators that bake."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is something to bake; otherwise the button says what is missing."""
-        reason = why_no_start(context)
-        if not reason and session.current().is_live:
-            reason = "Live mode is on: press Keep or Discard first"
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
-
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return analysis.own_changes(scene)
+    def missing(cls, context: bpy.types.Context) -> str:
+        is_live = session.current().is_live
+        return why_no_start(context) or ("Live mode is on: press Keep or Discard first" if is_live else "")
 
 
 class _Pressing(_Bake):
@@ -101,8 +91,7 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
     bl_idname = "softground.sink_feet"
     bl_label = "Sink Feet"
 
-    def _pressed(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
-        return sink_feet.sink_feet(scene)
+    _pressed = staticmethod(sink_feet.sink_feet)
 
     def _show(self, result: bake_job.BakeResult) -> None:
         gaps: Any = result.report["gaps_mm"]
@@ -114,8 +103,7 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
 class _ChangingTheMotion(_Bake):
     """Base of operators whose layer changes the motion that bakes read."""
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return nullcontext()
+    keeps_shot = False
 
 
 class SOFTGROUND_OT_clean_feet(_ChangingTheMotion):
@@ -129,8 +117,7 @@ class SOFTGROUND_OT_clean_feet(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[clean_feet.CleanFeet]:
-        return clean_feet.clean_feet(scene)
+    _job_of = staticmethod(clean_feet.clean_feet)
 
     def _show(self, result: clean_feet.CleanFeet) -> None:
         self.report({"INFO"}, result.summary)
@@ -145,8 +132,7 @@ class SOFTGROUND_OT_make_keys(_ChangingTheMotion):
     bl_idname = "softground.make_keys"
     bl_label = "Make Keys"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[make_keys.MadeKeys, ...]]:
-        return make_keys.make_keys(scene)
+    _job_of = staticmethod(make_keys.make_keys)
 
     def _show(self, result: tuple[make_keys.MadeKeys, ...]) -> None:
         for made in result:
@@ -166,8 +152,7 @@ class SOFTGROUND_OT_root_motion(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[root_motion.Travel, ...]]:
-        return root_motion.root_motion(scene)
+    _job_of = staticmethod(root_motion.root_motion)
 
     def _show(self, result: tuple[root_motion.Travel, ...]) -> None:
         for travel in result:

@@ -13,7 +13,8 @@ from ...core.errors import InputError, SoftGroundError
 from ...core.settings import ObjectName
 from .. import jobs, session, settings
 from ..characters import character_setup
-from ..operator_base import OnShot, reports_errors
+from ..operator_base import Act, OnShot, reports_errors
+from ..reading import analysis
 from ..remedies import said
 from ..state import state
 from ..translation import translated
@@ -57,30 +58,27 @@ _NAVIGATION = (
 """Events that change nothing in the file (first parts of their names): they go on to Blender during a bake."""
 
 
-class ModalJob(bpy.types.Operator):
+class ModalJob(Act):
     """Base of operators with a job: blocking in a script, modal for the user."""
-
-    bl_options = {"REGISTER", "UNDO"}
 
     cancelled: ClassVar[str] = ""
     """What to say when the user has left the job, if not that."""
+
+    keeps_shot: ClassVar[bool] = True
+    """True if what was read of the shot still holds after what the job changes."""
 
     stage_names: ClassVar[dict[str, str]] = STAGE_NAMES
     """What the status bar says of each stage."""
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """True if no other job runs."""
-        cls.poll_message_set(translated(BUSY))
-        return not session.current().is_baking
+    def missing(cls, context: bpy.types.Context) -> str:
+        return BUSY if session.current().is_baking else super().missing(context)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         with self._changing(scene):
             result = jobs.run(self._job_of(scene))
         self._show(result)
-        return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
@@ -91,7 +89,7 @@ class ModalJob(bpy.types.Operator):
 
     def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
         """What the scene's analysis makes of what the job changes."""
-        raise NotImplementedError
+        return analysis.own_changes(scene) if self.keeps_shot else nullcontext()
 
     def _done(self, progress: jobs.Progress) -> float:
         """The finished part of the job."""
@@ -236,8 +234,7 @@ class ModalJob(bpy.types.Operator):
 class Reading(ModalJob):
     """Base of operators that read the shot for its prediction."""
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return nullcontext()
+    keeps_shot = False
 
     def _done(self, progress: jobs.Progress) -> float:
         return progress.fraction
@@ -251,11 +248,6 @@ class ReadingShot(OnShot, Reading):
     """Base of operators that read the shot as it is."""
 
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if somebody leaves prints, and no other job runs."""
-        return super().poll(context) and Reading.poll.__func__(cls, context)
 
 
 class SOFTGROUND_OT_hold_window(bpy.types.Operator):
@@ -277,7 +269,7 @@ class SOFTGROUND_OT_hold_window(bpy.types.Operator):
         return {"PASS_THROUGH"} if _is_harmless(context, event) else {"RUNNING_MODAL"}
 
 
-class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
+class SOFTGROUND_OT_cancel_bake(Act):
     """Stop the bake; the scene stays as it was"""
 
     bl_idname = "softground.cancel_bake"
@@ -285,14 +277,11 @@ class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """True if there is a bake to cancel."""
-        cls.poll_message_set(translated("No bake is running"))
-        return bool(session.current().is_baking)
+    def missing(cls, _context: bpy.types.Context) -> str:
+        return "" if session.current().is_baking else "No bake is running"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         session.current().cancel_requested = True
-        return {"FINISHED"}
 
 
 def stop() -> None:

@@ -9,7 +9,8 @@ from bpy.props import StringProperty
 
 from .. import session, settings
 from ..ground import baked_ground
-from ..translation import CONTEXT, translated
+from ..operator_base import Act
+from ..translation import CONTEXT
 
 CATEGORY = "SoftGround"
 """The sidebar's tab."""
@@ -98,6 +99,16 @@ def chosen_of(owner: Any, items: str, active: str) -> Any:
     return listed[number] if 0 <= number < len(listed) else None
 
 
+def active_character(options: Any) -> Any:
+    """The character that is chosen in the list, or None."""
+    return chosen_of(options, "characters", "active_character")
+
+
+def active_sole(options: Any) -> Any:
+    """The sole that is chosen in the list of the active character, or None."""
+    return chosen_of(active_character(options), "soles", "active_sole")
+
+
 class OnMeshes:
     """Operators on a mesh that is named, or on those that are selected."""
 
@@ -114,10 +125,9 @@ class OnMeshes:
         return [obj for obj in context.selected_objects if obj.type == "MESH"]
 
 
-class RemovesChosen(bpy.types.Operator):
+class RemovesChosen(Act):
     """Operators that take the chosen item out of a list; the one that comes into its place is chosen then."""
 
-    bl_options: Any = {"REGISTER", "UNDO"}
     of_list = ("items", "active_item")
     """Names of the list and of the number of what is chosen in it."""
 
@@ -127,17 +137,15 @@ class RemovesChosen(bpy.types.Operator):
         return options
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if an item is chosen."""
-        cls.poll_message_set(translated("Select an item of the list first"))
-        return chosen_of(cls.owner(settings.options_of(context)), *cls.of_list) is not None
+    def missing(cls, context: bpy.types.Context) -> str:
+        chosen = chosen_of(cls.owner(settings.options_of(context)), *cls.of_list)
+        return "Select an item of the list first" if chosen is None else ""
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         owner, (items, active) = self.owner(settings.options_of(context)), self.of_list
         listed = getattr(owner, items)
         listed.remove(getattr(owner, active))
         setattr(owner, active, max(0, min(getattr(owner, active), len(listed) - 1)))
-        return {"FINISHED"}
 
 
 class Listed(bpy.types.UIList):

@@ -22,7 +22,7 @@ from ...core.settings import BakeSettings
 from ...core.soles.deep_ground import wading
 from .. import jobs, session, settings
 from ..live import live
-from ..operator_base import OnShot, reports_errors
+from ..operator_base import Act, OnShot
 from ..reading import analysis
 from ..remedies import said
 from ..state import state
@@ -251,12 +251,11 @@ class SOFTGROUND_OT_predict_depth(ReadingShot):
         return [("INFO", text)]
 
 
-class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
+class SOFTGROUND_OT_match_depth(OnShot, Act):
     """Set the stiffness of the ground so that the typical step is as deep as you type"""
 
     bl_idname = "softground.match_depth"
     bl_label = "Match Depth"
-    bl_options = {"REGISTER", "UNDO"}
 
     depth: FloatProperty(
         name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
@@ -268,11 +267,9 @@ class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
             self.depth = depth * 100
         return context.window_manager.invoke_props_dialog(self)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
-        return {"FINISHED"}
 
 
 CLASSES = (SOFTGROUND_OT_predict_depth, SOFTGROUND_OT_match_depth)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground, baked_steps, ground_mesh
-from ..operator_base import OnBake
+from ..operator_base import Act, OnBake
 from ..placement import in_scene
 from ..state import state
 
@@ -142,20 +142,19 @@ def _light(shading: Any, look: float) -> None:
         shading.studiolight_rotate_z = (look + pi) % (2 * pi) - pi
 
 
-class SOFTGROUND_OT_show_prints(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_show_prints(OnBake, Act):
     """Go to the frame where the last foot leaves its print, and look at the last steps from close by, in a low light"""
 
     bl_idname = "softground.show_prints"
     bl_label = "Show Prints"
     bl_options = {"REGISTER"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         scene.frame_set(last_step(scene.softground))
         if _viewport(context.area):
             prints = _last_prints(scene.softground.ground, scene.frame_current)
             _show(prints, context.area, scene.unit_settings.scale_length)
-        return {"FINISHED"}
 
 
 CLASSES = (SOFTGROUND_OT_show_prints,)

@@ -14,8 +14,7 @@ from ...core.events import phases as event_phases
 from .. import mesh_arrays, settings
 from ..baking import bake_report
 from ..ground import baked_ground
-from ..operator_base import OnBake, reports_errors
-from ..translation import translated
+from ..operator_base import Act, OnBake
 
 NAME = "SoftGround Events"
 
@@ -82,29 +81,23 @@ def events_of(bakes: Iterable[bake_report.HeardBake]) -> list[events.Event]:
     return events.in_order(row for bake, table in tables for row in table if bake.has(row["character"], row["frame"]))
 
 
-class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_event_points(OnBake, Act):
     """Add an object whose points are the events of the bake: where and when each foot strikes, slides and leaves"""
 
     bl_idname = "softground.event_points"
     bl_label = "Add Event Points"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         table = events_of(bake_report.heard_bakes(settings.options_of(context)))
         shown = add_points(settings.scene_of(context), table)
-        self.report(
-            {"INFO"}, translated("{count} events are the points of '{name}'", count=len(table), name=shown.name)
-        )
-        return {"FINISHED"}
+        self.say("{count} events are the points of '{name}'", count=len(table), name=shown.name)
 
 
-class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_event_markers(OnBake, Act):
     """Add markers to the timeline where each foot strikes and leaves the ground"""
 
     bl_idname = "softground.event_markers"
     bl_label = "Mark Events in Timeline"
-    bl_options = {"REGISTER", "UNDO"}
 
     phases: EnumProperty(
         name="Events",
@@ -114,12 +107,10 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
         default=MARKED,
     )
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         table = events_of(bake_report.heard_bakes(settings.options_of(context)))
         count = add_markers(settings.scene_of(context).timeline_markers, table, set(self.phases))
-        self.report({"INFO"}, translated("Marked {count} events", count=count))
-        return {"FINISHED"}
+        self.say("Marked {count} events", count=count)
 
 
 CLASSES = (SOFTGROUND_OT_event_points, SOFTGROUND_OT_event_markers)

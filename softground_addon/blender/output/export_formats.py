@@ -17,7 +17,7 @@ from ...core.events import event_files, event_midi, events
 from ...core.files import files
 from .. import settings
 from ..baking import bake_report
-from ..operator_base import OnBake, beside_file, reports_errors
+from ..operator_base import Act, OnBake, beside_file
 from ..reading import analysis
 from ..translation import translated
 from . import event_points, exports, image_exports, opensim_exports, sound_exports
@@ -293,7 +293,7 @@ def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
     return ground
 
 
-class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_export(OnBake, Act):
     """Write the baked ground for other programs: Alembic, USD, a point cache, image sequences or the final mesh"""
 
     bl_idname = "softground.export"
@@ -361,8 +361,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
                 column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
         layout.prop(self, "outdated")
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         set_frames = self.properties.is_property_set("frame_start") or self.properties.is_property_set("frame_end")
         options = scene.softground
@@ -379,21 +378,17 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         else:
             text = translated("Wrote {count} files to {folder}", count=len(written), folder=path.parent)
         self.report({"INFO"}, text)
-        return {"FINISHED"}
 
 
-class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_final_mesh(OnBake, Act):
     """Add the ground as it is after the last step to the scene, as a plain mesh that does not move"""
 
     bl_idname = "softground.final_mesh"
     bl_label = "Add Final Mesh"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         still = exports.final_mesh(settings.options_of(context).ground)
-        self.report({"INFO"}, translated("Added '{name}'", name=still.name))
-        return {"FINISHED"}
+        self.say("Added '{name}'", name=still.name)
 
 
 CLASSES = (SOFTGROUND_OT_export, SOFTGROUND_OT_final_mesh)

@@ -21,7 +21,7 @@ from ...core.numerics.arrays import Array
 from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
-from ..operator_base import OnBake, beside_file, reports_errors
+from ..operator_base import Act, OnBake, beside_file
 from ..reading import analysis
 from ..remedies import said
 from ..translation import translated
@@ -173,16 +173,14 @@ def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
     return footprints, np.arange(first, last + 1, dtype=float)
 
 
-class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_force_curves(OnBake, Act):
     """Put the force and contact of every sole on an empty, as animated properties for the Graph Editor and for
     drivers"""
 
     bl_idname = "softground.force_curves"
     bl_label = "Add Force Curves"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         empties = write_curves(settings.scene_of(context), *_baked(context))
         for other in context.selected_objects:
             other.select_set(False)
@@ -191,12 +189,10 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
                 empty.select_set(True)
                 if context.mode == "OBJECT":
                     context.view_layer.objects.active = empty
-        names = ", ".join(f"'{empty.name}'" for empty in empties)
-        self.report({"INFO"}, translated("The forces are on {names}", names=names))
-        return {"FINISHED"}
+        self.say("The forces are on {names}", names=", ".join(f"'{empty.name}'" for empty in empties))
 
 
-class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_export_forces(OnBake, Act):
     """Write the force and contact of every sole at every frame to a table (CSV)"""
 
     bl_idname = "softground.export_forces"
@@ -212,8 +208,7 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         footprints, frames = _baked(context)
         scene = settings.scene_of(context)
         try:
@@ -224,8 +219,7 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
             estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
         files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), estimates))
-        self.report({"INFO"}, translated("Wrote {path}", path=path))
-        return {"FINISHED"}
+        self.say("Wrote {path}", path=path)
 
 
 CLASSES = (SOFTGROUND_OT_force_curves, SOFTGROUND_OT_export_forces)

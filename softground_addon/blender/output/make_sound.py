@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 from ...core.errors import InputError
 from ...core.files import files
 from .. import compat, settings
-from ..operator_base import OnBake, beside_file, reports_errors
+from ..operator_base import Act, OnBake, beside_file
 from ..translation import translated
 from . import sound_exports
 
@@ -49,12 +49,11 @@ def _free_channel(strips: Any) -> int:
     return 1 + max((strip.channel for strip in strips), default=0)
 
 
-class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_make_sound(OnBake, Act):
     """Compute the sound of the footsteps from their forces, save it beside the file, and add it to the sequencer"""
 
     bl_idname = "softground.make_sound"
     bl_label = "Make Sound"
-    bl_options = {"REGISTER", "UNDO"}
 
     samples: StringProperty(
         name="Own Sounds",
@@ -85,8 +84,7 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
             )
             layout.prop(self, "replace")
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         if not bpy.data.filepath:
             raise InputError("The sound is written beside the .blend file: save the file first.")
@@ -104,9 +102,7 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
         if compat.PLAYS_SOUND:
             put_strip(compat.strips_of(scene), path, options.frame_start)
             compat.show_in_sequencer(context, scene)
-        text = "Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}"
-        self.report({"INFO"}, translated(text, path=path))
-        return {"FINISHED"}
+        self.say("Wrote {path}, and put it into the sequencer" if compat.PLAYS_SOUND else "Wrote {path}", path=path)
 
 
 CLASSES = (SOFTGROUND_OT_make_sound,)

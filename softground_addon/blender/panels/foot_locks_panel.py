@@ -8,28 +8,24 @@ import bpy
 
 from ...core.errors import InputError
 from .. import settings
-from ..operator_base import reports_errors
-from ..operators.character_editing import active_character
-from ..operators.panel_base import CharacterPanel, Listed, RemovesChosen, chosen_of, draw_list
-from ..translation import CONTEXT, translated
+from ..operator_base import Act
+from ..operators.panel_base import CharacterPanel, Listed, RemovesChosen, active_character, chosen_of, draw_list
+from ..translation import CONTEXT
 
 
-class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
+class SOFTGROUND_OT_add_foot_lock(Act):
     """Lock the contact at the current frame: of the selected bone's foot, or else of the foot that is lowest"""
 
     bl_idname = "softground.add_foot_lock"
     bl_label = "Add Foot Lock"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character with an armature is chosen."""
-        cls.poll_message_set(translated("Choose a character with an armature first"))
+    def missing(cls, context: bpy.types.Context) -> str:
         character = active_character(settings.options_of(context))
-        return bool(character and settings.exists(character.armature))
+        has_rig = character and settings.exists(character.armature)
+        return "" if has_rig else "Choose a character with an armature first"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         assert character is not None
@@ -37,7 +33,6 @@ class SOFTGROUND_OT_add_foot_lock(bpy.types.Operator):
         hold = character.holds.add()
         hold.foot, hold.frame = foot, scene.frame_current
         character.active_hold = len(character.holds) - 1
-        return {"FINISHED"}
 
 
 def _foot_at_hand(character: Any, chosen: bpy.types.PoseBone | None) -> str:

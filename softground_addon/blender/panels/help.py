@@ -12,8 +12,8 @@ from ...core.errors import SoftGroundError
 from .. import settings
 from ..command_line import program
 from ..ground import baked_ground, ground_mesh
+from ..operator_base import Checked
 from ..operators.bake_result import warnings_of
-from ..translation import translated
 
 MANUAL = program.PACKAGE / "manual"
 """The manual's pages; the package has them, the sources do not."""
@@ -64,17 +64,15 @@ PAGES = (
 """By names of operators and properties, as Blender's own *Online Manual* finds them; the first that fits."""
 
 
-class SOFTGROUND_OT_open_manual(bpy.types.Operator):
+class SOFTGROUND_OT_open_manual(Checked):
     """Open SoftGround's manual in the web browser. It is part of the add-on and needs no network"""
 
     bl_idname = "softground.open_manual"
     bl_label = "SoftGround Manual"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """True if this copy of the add-on has a manual."""
-        cls.poll_message_set(translated("The sources have no manual: read docs/, or install the package"))
-        return MANUAL.is_dir()
+    def missing(cls, _context: bpy.types.Context) -> str:
+        return "" if MANUAL.is_dir() else "The sources have no manual: read docs/, or install the package"
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         bpy.ops.wm.url_open(url=(MANUAL / "index.html").as_uri())

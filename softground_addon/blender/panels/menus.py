@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -62,32 +63,29 @@ class SOFTGROUND_MT_output(bpy.types.Menu):
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 
-def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
-    """Append the add-on's menu to the Object menu."""
+def _draw_menu(menu: Any, _context: bpy.types.Context) -> None:
     menu.layout.separator()
     menu.layout.menu("SOFTGROUND_MT_object")
 
 
-def draw_in_armature_menu(menu: Any, _context: bpy.types.Context) -> None:
-    """Append the sample figure to the armatures that can be added."""
-    menu.layout.operator("softground.add_sample_scene", text="SoftGround Walking Figure", icon="OUTLINER_OB_ARMATURE")
+def _entry(operator: str, *, text: str, icon: str = "NONE", **values: Any) -> Callable[[Any, bpy.types.Context], None]:
+    """A function that appends an operator to a menu."""
 
+    def draw(menu: Any, _context: bpy.types.Context) -> None:
+        button = menu.layout.operator(operator, text=text, icon=icon)
+        for name, value in values.items():
+            setattr(button, name, value)
 
-def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
-    """Append the ground to what can be added as a mesh."""
-    menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
-
-
-def draw_in_export_menu(menu: Any, _context: bpy.types.Context) -> None:
-    """Append the ground to what can be exported."""
-    menu.layout.operator("softground.export", text="SoftGround (.abc, .usdc, .pc2, .exr, ...)")
+    return draw
 
 
 _ENTRIES = {
-    "VIEW3D_MT_object": draw_in_object_menu,
-    "VIEW3D_MT_mesh_add": draw_in_add_menu,
-    "VIEW3D_MT_armature_add": draw_in_armature_menu,
-    "TOPBAR_MT_file_export": draw_in_export_menu,
+    "VIEW3D_MT_object": _draw_menu,
+    "VIEW3D_MT_mesh_add": _entry("softground.create_ground", text="SoftGround", icon="MESH_GRID", use_selected=False),
+    "VIEW3D_MT_armature_add": _entry(
+        "softground.add_sample_scene", text="SoftGround Walking Figure", icon="OUTLINER_OB_ARMATURE"
+    ),
+    "TOPBAR_MT_file_export": _entry("softground.export", text="SoftGround (.abc, .usdc, .pc2, .exr, ...)"),
 }
 """What is appended to Blender's own menus, by their names."""
 

@@ -19,9 +19,17 @@ from ..characters import character_setup, import_fixes, selection
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..operators import bake_result, prediction
-from ..operators.character_editing import active_character, active_sole, suggested_mass
-from ..operators.panel_base import CharacterPanel, Listed, SidebarPanel, belongs_to, chosen_of, draw_list
-from ..settings import is_prop, is_set_up
+from ..operators.panel_base import (
+    CharacterPanel,
+    Listed,
+    SidebarPanel,
+    active_character,
+    active_sole,
+    belongs_to,
+    chosen_of,
+    draw_list,
+)
+from ..setup.character_editing import suggested_mass
 from ..translation import translated
 from . import outdated, preset_menu
 
@@ -33,7 +41,7 @@ class SOFTGROUND_UL_characters(Listed):
     """Characters by name, each with its armature."""
 
     def draw_row(self, layout: Any, item: Any) -> None:
-        icon = "MESH_UVSPHERE" if is_prop(item) else "OUTLINER_OB_MESH" if item.body else "ERROR"
+        icon = "MESH_UVSPHERE" if settings.is_prop(item) else "OUTLINER_OB_MESH" if item.body else "ERROR"
         icon = "ARMATURE_DATA" if item.armature else icon
         layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
 
@@ -82,9 +90,9 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
             return
         draw_list(layout, options, "characters", "active_character", "character", rows=1, most=5)
-        character = active_character(settings.options_of(context))
+        character = active_character(options)
         if character:
-            if not is_set_up(character):
+            if not settings.is_set_up(character):
                 layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
@@ -107,18 +115,15 @@ def _scale(layout: Any, unit_scale: float, character: Any) -> None:
     box = layout.box().column(align=True)
     shown = f"{size:.0f} m" if factor < 1 else f"{size * 100:.2g} cm"
     unit = wrong_unit(size, captured=captured).partition(",")[0]
-    box.label(
-        text=translated("{size} in size: made in {unit}", size=shown, unit=translated(unit)),
-        icon="ERROR",
-        translate=False,
-    )
+    text = translated("{size} in size: made in {unit}", size=shown, unit=translated(unit))
+    box.label(text=text, icon="ERROR", translate=False)
     box.operator("softground.fix_scale", text=translated("Scale by {factor}", factor=f"{factor:g}"), translate=False)
 
 
 def _on_the_spot(layout: Any, predicted: prediction.DepthPrediction | None, character: Any) -> None:
     """That a character walks in place, and a button that lets it travel."""
     title = character_setup.title_of(character)
-    if is_prop(character) or predicted is None or title not in predicted.analysis.belts:
+    if settings.is_prop(character) or predicted is None or title not in predicted.analysis.belts:
         return
     box = layout.box().column(align=True)
     box.label(text="Walks on the spot", icon="INFO")
@@ -345,13 +350,20 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
 
 
 def _bake_buttons(layout: Any, options: Any, state: Any, *, is_outdated: bool) -> None:
-    """The large button, with the feet beside it, and live mode below."""
+    """The large button, with the feet beside it; below, one that starts live mode, or two that end it."""
     row = layout.split(factor=0.66, align=True)
     row.use_property_split = False
     row.scale_y = _LARGE
     row.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
     row.prop(options, "sink_feet", toggle=True)
-    _live_buttons(layout, state)
+    if not state.is_live:
+        layout.operator("softground.live", icon="PLAY")
+        return
+    row = layout.row(align=True)
+    row.alert = True
+    row.operator("softground.live", text="Discard", icon="X").keep = False
+    row.alert = False
+    row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
 
 
 def _apart_from_scene(scene: Any) -> str:
@@ -366,18 +378,6 @@ def _apart_from_scene(scene: Any) -> str:
         baked=f"{start}-{end}",
         shown=f"{scene.frame_start}-{scene.frame_end}",
     )
-
-
-def _live_buttons(layout: Any, state: Any) -> None:
-    """One button to start live mode; two to end it, with and without the prints."""
-    if not state.is_live:
-        layout.operator("softground.live", icon="PLAY")
-        return
-    row = layout.row(align=True)
-    row.alert = True
-    row.operator("softground.live", text="Discard", icon="X").keep = False
-    row.alert = False
-    row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
 
 
 def _changing_ground(layout: Any, options: Any) -> None:

@@ -15,7 +15,7 @@ from ...core.files import files
 from ...core.ground import presets
 from .. import ground_presets, settings
 from ..characters import character_setup
-from ..operator_base import reports_errors
+from ..operator_base import Act
 from ..preset_files import listed, loaded, user_folder
 from ..reading import analysis
 from ..translation import CONTEXT, translated
@@ -75,12 +75,11 @@ def _entry(layout: Any, path: Path, preset: presets.Preset, *, translate: bool) 
     layout.operator("softground.load_preset", text=preset.name, translate=translate, **shown).filepath = str(path)
 
 
-class SOFTGROUND_OT_load_preset(bpy.types.Operator):
+class SOFTGROUND_OT_load_preset(Act):
     """Set the ground to a preset"""
 
     bl_idname = "softground.load_preset"
     bl_label = "Load Ground Preset"
-    bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(name="Name", description="Name of a preset")
     filepath: StringProperty(name="File", description="Preset file, instead of a name", subtype="FILE_PATH")
@@ -103,10 +102,8 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
             )
         return "\n".join(lines)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         ground_presets.apply_preset(settings.options_of(context), _chosen(self))
-        return {"FINISHED"}
 
 
 def _chosen(properties: Any) -> presets.Preset:
@@ -114,7 +111,7 @@ def _chosen(properties: Any) -> presets.Preset:
     return presets.load(Path(path)) if path else presets.find(properties.name, (presets.FOLDER, user_folder()))
 
 
-class SOFTGROUND_OT_save_preset(bpy.types.Operator):
+class SOFTGROUND_OT_save_preset(Act):
     """Save the ground as a preset of your own"""
 
     bl_idname = "softground.save_preset"
@@ -138,8 +135,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
         if _with_like_name(self.name, user_folder()):
             layout.prop(self, "replace")
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         name = self.name.strip()
         if not presets.bare(name):
             raise InputError("A preset needs a name with letters or digits: type one.")
@@ -158,11 +154,10 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
             if other != path:
                 other.unlink()
         scene.softground.material.preset = name
-        self.report({"INFO"}, translated("Saved preset '{name}'", name=name))
-        return {"FINISHED"}
+        self.say("Saved preset '{name}'", name=name)
 
 
-class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
+class SOFTGROUND_OT_remove_preset(Act):
     """Delete the current preset, if it is your own; the ground keeps its values"""
 
     bl_idname = "softground.remove_preset"
@@ -170,16 +165,13 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if the chosen preset is one of the user's."""
-        cls.poll_message_set(translated("Built-in presets cannot be deleted; choose one of your own"))
-        return _chosen_of_user(context) is not None
+    def missing(cls, context: bpy.types.Context) -> str:
+        return "" if _chosen_of_user(context) else "Built-in presets cannot be deleted; choose one of your own"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         path = _chosen_of_user(context)
         assert path is not None
         path.unlink()
-        return {"FINISHED"}
 
 
 def _chosen_of_user(context: bpy.types.Context) -> Path | None:

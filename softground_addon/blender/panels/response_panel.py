@@ -14,8 +14,9 @@ from .. import session, settings
 from ..animation_layer.constraint_layer import LayerKind, has_layer, notes_of
 from ..baking import root_motion
 from ..characters import import_fixes
-from ..operators.character_editing import active_character
-from ..operators.panel_base import CharacterPanel, SidebarPanel
+from ..operator_base import Act
+from ..operators.modal_job import BUSY
+from ..operators.panel_base import CharacterPanel, SidebarPanel, active_character
 from ..response import response_job
 from ..translation import translated
 
@@ -27,12 +28,11 @@ _SHOWN = 5
 """Frames with gaps that the panel lists."""
 
 
-class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
+class SOFTGROUND_OT_tilt_preset(Act):
     """Choose a set of values for how the body sways"""
 
     bl_idname = "softground.tilt_preset"
     bl_label = "Tilt Preset"
-    bl_options = {"REGISTER", "UNDO"}
 
     source: EnumProperty(
         name="Values",
@@ -44,19 +44,14 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if the chosen character has bones and a mass, which the paper's values depend on."""
-        cls.poll_message_set(translated("Choose a character with an armature and a mass first"))
+    def missing(cls, context: bpy.types.Context) -> str:
         scene = settings.scene_of(context)
-        character = active_character(scene.softground)
-        return bool(
-            character
-            and character.armature
-            and character.mass > 0
-            and import_fixes.sizes_of(scene.unit_settings.scale_length, character)[0] > 0
-        )
+        character, scale = active_character(scene.softground), scene.unit_settings.scale_length
+        has_body = character and character.armature and character.mass > 0
+        is_sized = has_body and import_fixes.sizes_of(scale, character)[0] > 0
+        return "" if is_sized else "Choose a character with an armature and a mass first"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         body = {
@@ -69,15 +64,13 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
             "PAPER": body_gains(*PAPER_TORQUES, **body),
         }[self.source]
         scene.softground.tilt.frequency, scene.softground.tilt.damping = gains.frequency, gains.damping
-        return {"FINISHED"}
 
 
-class SOFTGROUND_OT_response_preset(bpy.types.Operator):
+class SOFTGROUND_OT_response_preset(Act):
     """Choose how arms, trunk and speed respond to deep ground. Bake again afterwards"""
 
     bl_idname = "softground.response_preset"
     bl_label = "Response Preset"
-    bl_options = {"REGISTER", "UNDO"}
 
     preset: EnumProperty(
         name="Preset",
@@ -98,10 +91,9 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
         ],
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         options, wades = scene.softground, self.preset == "WADING"
-        _unset_unnoted(options)
         for part in settings.PERFORMANCE:
             setattr(options.grounding, part, 0.0)
         options.grounding.arms, options.tilt.use = WADING_ARMS * wades, wades
@@ -114,15 +106,6 @@ class SOFTGROUND_OT_response_preset(bpy.types.Operator):
             settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
         elif (scene.render.frame_map_old, scene.render.frame_map_new) == tuple(options.slowed_time):
             settings.slow_down(scene, 1.0)
-        return {"FINISHED"}
-
-
-def _unset_unnoted(options: Any) -> None:
-    """Unset the strength of Tilt where Wading of an earlier version has set it, which did not note the user's own."""
-    tilt = options.tilt
-    wades = tilt.use and isclose(tilt.strength, WADING_TILT, rel_tol=1e-6) and options.grounding.arms == WADING_ARMS
-    if wades and tilt.own_strength < 0.0:
-        tilt.property_unset("strength")
 
 
 def _lend(tilt: Any, strength: float) -> None:
@@ -142,7 +125,7 @@ def _give_back(tilt: Any, lent: float) -> None:
     tilt.property_unset("own_strength")
 
 
-class SOFTGROUND_OT_show_frame(bpy.types.Operator):
+class SOFTGROUND_OT_show_frame(Act):
     """Go to this frame"""
 
     bl_idname = "softground.show_frame"
@@ -151,53 +134,44 @@ class SOFTGROUND_OT_show_frame(bpy.types.Operator):
 
     frame: FloatProperty(name="Frame", options={"HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         settings.scene_of(context).frame_set(int(self.frame), subframe=self.frame % 1.0)
-        return {"FINISHED"}
 
 
-class SOFTGROUND_OT_slow_down(bpy.types.Operator):
+class SOFTGROUND_OT_slow_down(Act):
     """Stretch the scene's time (Output > Frame Range > Time Stretching) to the speed at which people would walk on
     this ground. Bake again afterwards"""
 
     bl_idname = "softground.slow_down"
     bl_label = "Slow Down"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a bake has told the speed."""
-        cls.poll_message_set(translated("Bake with Sink Feet or Grounding on first: the bake suggests a speed"))
+    def missing(cls, context: bpy.types.Context) -> str:
         character = active_character(settings.options_of(context))
-        return bool(character and character.armature and has_layer(character.armature))
+        is_known = character and character.armature and has_layer(character.armature)
+        return "" if is_known else "Bake with Sink Feet or Grounding on first: the bake suggests a speed"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         character = active_character(scene.softground)
         assert character is not None
         settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
-        return {"FINISHED"}
 
 
-class _RemoveLayer(bpy.types.Operator):
+class _RemoveLayer(Act):
     """Base of the operators that remove layers of some kinds from all characters."""
-
-    bl_options = {"REGISTER", "UNDO"}
 
     kinds = tuple(LayerKind)  # without an annotation: Blender would keep what it names, and hang as Python exits
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character has such a layer and no job runs."""
+    def missing(cls, context: bpy.types.Context) -> str:
         characters = settings.options_of(context).characters
         if not any(character.armature and has_layer(character.armature, cls.kinds[0]) for character in characters):
-            cls.poll_message_set(translated("No character has this layer"))
-            return False
-        return not session.current().is_baking
+            return "No character has this layer"
+        return BUSY if session.current().is_baking else ""
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         response_job.remove_layers(settings.scene_of(context), *self.kinds)
-        return {"FINISHED"}
 
 
 class SOFTGROUND_OT_remove_root_motion(_RemoveLayer):

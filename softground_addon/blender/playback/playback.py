@@ -16,7 +16,7 @@ from ...core.playback.playback_curves import PlaybackCurves, Spans
 from .. import mesh_arrays
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
-from ..nodes.node_modifiers import modifier_with
+from ..nodes.node_modifiers import modifier_with, put, showing
 from ..settings import find, name_of, resolve
 from . import own_data
 from . import playback_nodes as nodes
@@ -83,14 +83,8 @@ def attach(
 
 def play(ground: bpy.types.Object, group: bpy.types.NodeTree) -> Any:
     """Have an object play a node group by a modifier of its own, the first."""
-    active = ground.modifiers.active
-    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = group
-    modifier.show_in_editmode = False
+    modifier = put(ground, MODIFIER, group, 0)
     modifier.show_expanded = False
-    ground.modifiers.move(len(ground.modifiers) - 1, 0)
-    if active:  # the one that the user works at stays so
-        ground.modifiers.active = active
     return modifier
 
 
@@ -111,9 +105,7 @@ def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
 
 def playing(ground: bpy.types.Object) -> list[tuple[bpy.types.Object, Any]]:
     """The objects that show a ground's mesh and play it, the ground or copies of it, each with its modifier."""
-    mesh = cast("bpy.types.Mesh", ground.data)
-    copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
-    return [(shown, modifier) for shown in {ground, *copies} if (modifier := modifier_of(shown))]
+    return [(shown, modifier) for shown in showing(ground) if (modifier := modifier_of(shown))]
 
 
 def remove(ground: bpy.types.Object) -> None:

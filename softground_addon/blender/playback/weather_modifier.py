@@ -27,16 +27,9 @@ def inputs_of(modifier: Any) -> dict[str, str]:
 
 def put(ground: bpy.types.Object, tree: bpy.types.NodeTree) -> Any:
     """Have weather act on an object, right behind its playback; the modifier that is active stays so."""
-    active = ground.modifiers.active
-    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = tree
-    modifier.show_in_editmode = False
     before = playback.modifier_of(ground)
     place = list(ground.modifiers).index(before) + 1 if before else 0
-    ground.modifiers.move(len(ground.modifiers) - 1, place)
-    if active:
-        ground.modifiers.active = active
-    return modifier
+    return node_modifiers.put(ground, MODIFIER, tree, place)
 
 
 def separate(modifier: Any) -> bool:
@@ -55,13 +48,11 @@ def separate(modifier: Any) -> bool:
 
 def remove(ground: bpy.types.Object) -> None:
     """Take weather off a ground and copies of it with the same mesh; nothing happens where there is none."""
-    mesh = cast("bpy.types.Mesh", ground.data)
-    copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
-    for shown in {ground, *copies}:
+    for shown in node_modifiers.showing(ground):
         while modifier := modifier_of(shown):
             shown.modifiers.remove(modifier)
     remove_unused()
-    own_data.remove(mesh, nodes.OF_WEATHER)
+    own_data.remove(cast("bpy.types.Mesh", ground.data), nodes.OF_WEATHER)
 
 
 def remove_unused() -> None:

@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from .character import (
-    DEFAULT_MASS,
-    SoftGroundCharacter,
-    SoftGroundHold,
-    SoftGroundJoint,
-    SoftGroundPart,
-    SoftGroundSole,
-)
+from .character import SoftGroundCharacter, SoftGroundHold, SoftGroundJoint, SoftGroundPart, SoftGroundSole
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
-from .scene import (
-    DEFAULT_CELL_SIZE,
-    SoftGroundFurtherGround,
-    SoftGroundHardGround,
-    SoftGroundPrinted,
-    SoftGroundSettings,
-)
+from .scene import SoftGroundFurtherGround, SoftGroundHardGround, SoftGroundPrinted, SoftGroundSettings
 
 CLASSES = (
     SoftGroundJoint,
@@ -37,18 +24,3 @@ CLASSES = (
     SoftGroundSettings,
     SoftGroundPreferences,
 )
-
-__all__ = [
-    "CLASSES",
-    "DEFAULT_CELL_SIZE",
-    "DEFAULT_MASS",
-    "SoftGroundCharacter",
-    "SoftGroundGrounding",
-    "SoftGroundJoint",
-    "SoftGroundMaterial",
-    "SoftGroundPainted",
-    "SoftGroundPreferences",
-    "SoftGroundSettings",
-    "SoftGroundSole",
-    "SoftGroundTilt",
-]

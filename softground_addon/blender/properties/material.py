@@ -21,9 +21,11 @@ DEFAULT: Any = presets.find(presets.DEFAULT)
 """What the settings of a ground are in a new scene."""
 
 
-def _of_field(field: str) -> dict[str, float]:
+def _number(field: str, name: str, description: str, **looks: Any) -> Any:
+    """A property for a field of the material, within its range."""
     low, high = MATERIAL_RANGES[field]
-    return {"min": low, "max": high, "default": getattr(DEFAULT.material, field)}
+    default = getattr(DEFAULT.material, field)
+    return FloatProperty(name=name, description=description, min=low, max=high, default=default, **looks)
 
 
 _STIFFNESS = (
@@ -68,124 +70,84 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         items=[(surface.name, surface.label, "") for surface in SURFACES.values()],
         default=DEFAULT.surface,
     )
-    youngs_modulus: FloatProperty(
-        name="Young's Modulus (Pa)",
-        description=_STIFFNESS,
-        precision=0,
-        step=1000000,
-        **_of_field("youngs_modulus"),
-    )
-    poisson_ratio: FloatProperty(
-        name="Rim Volume",
-        description="How much of the displaced volume rises around the foot: none at 0, all of it at "
-        "0.5 (sand). Poisson's ratio",
+    youngs_modulus: _number("youngs_modulus", "Young's Modulus (Pa)", _STIFFNESS, precision=0, step=1000000)
+    poisson_ratio: _number(
+        "poisson_ratio",
+        "Rim Volume",
+        "How much of the displaced volume rises around the foot: none at 0, all of it at 0.5 (sand). Poisson's ratio",
         precision=3,
-        **_of_field("poisson_ratio"),
     )
-    characteristic_time: FloatProperty(
-        name="Settling Time",
-        description="How long the ground takes to give way under a steady load",
+    characteristic_time: _number(
+        "characteristic_time",
+        "Settling Time",
+        "How long the ground takes to give way under a steady load",
         precision=3,
         unit="TIME_ABSOLUTE",
-        **_of_field("characteristic_time"),
     )
-    layer_depth: FloatProperty(
-        name="Layer Depth (m)",
-        description=_LAYER,
-        precision=3,
-        soft_max=2.0,
-        **_of_field("layer_depth"),
-    )
-    rim_reach: FloatProperty(
-        name="Rim Reach (m)",
-        description=_RIM_REACH,
-        precision=3,
-        soft_max=0.5,
-        **_of_field("rim_reach"),
-    )
-    blur_sigma: FloatProperty(
-        name="Smoothing (m)",
-        description=_SMOOTHING,
-        precision=4,
-        soft_max=0.05,
-        **_of_field("blur_sigma"),
-    )
-    rim_bias: FloatProperty(
-        name="Forward Push",
-        description="How much more of the rim rises ahead of a moving foot than behind it: at 0 the "
+    layer_depth: _number("layer_depth", "Layer Depth (m)", _LAYER, precision=3, soft_max=2.0)
+    rim_reach: _number("rim_reach", "Rim Reach (m)", _RIM_REACH, precision=3, soft_max=0.5)
+    blur_sigma: _number("blur_sigma", "Smoothing (m)", _SMOOTHING, precision=4, soft_max=0.05)
+    rim_bias: _number(
+        "rim_bias",
+        "Forward Push",
+        "How much more of the rim rises ahead of a moving foot than behind it: at 0 the "
         "rim is even, at 1 nothing rises right behind",
         subtype="FACTOR",
-        **_of_field("rim_bias"),
     )
-    repose_angle: FloatProperty(
-        name="Angle of Repose",
-        description="Steepest slope that loose ground can hold: steeper rims and walls slide down. 0 "
+    repose_angle: _number(
+        "repose_angle",
+        "Angle of Repose",
+        "Steepest slope that loose ground can hold: steeper rims and walls slide down. 0 "
         "leaves them as pressed; dry sand holds 32°",
         subtype="ANGLE",
-        **_of_field("repose_angle"),
     )
-    shortest_time: FloatProperty(
-        name="Shortest Time",
-        description="Lower limit of the settling time under a fast landing, where the ground gives "
+    shortest_time: _number(
+        "shortest_time",
+        "Shortest Time",
+        "Lower limit of the settling time under a fast landing, where the ground gives "
         "way as fast as the foot stops. 0 always uses the full Settling Time",
         precision=3,
         soft_max=0.2,
         unit="TIME_ABSOLUTE",
-        **_of_field("shortest_time"),
     )
-    hardening: FloatProperty(
-        name="Hardening",
-        description="How much stiffer trodden ground is under the next foot: at 10, a second "
+    hardening: _number(
+        "hardening",
+        "Hardening",
+        "How much stiffer trodden ground is under the next foot: at 10, a second "
         "identical step adds less than a third of the depth. 0 is off",
         precision=1,
         soft_max=50.0,
-        **_of_field("hardening"),
     )
-    crust_stress: FloatProperty(
-        name="Crust (Pa)",
-        description=_CRUST,
-        precision=0,
-        soft_max=100e3,
-        step=100000,
-        **_of_field("crust_stress"),
-    )
-    firm_depth: FloatProperty(
-        name="Firm Below (m)",
-        description=_FIRM_BELOW,
-        precision=3,
-        soft_max=0.3,
-        **_of_field("firm_depth"),
-    )
-    exponent: FloatProperty(
-        name="Exponent",
-        description="How stress grows with compression: 1 is a spring, as in the paper. In snow, at 2, twice the "
+    crust_stress: _number("crust_stress", "Crust (Pa)", _CRUST, precision=0, soft_max=100e3, step=100000)
+    firm_depth: _number("firm_depth", "Firm Below (m)", _FIRM_BELOW, precision=3, soft_max=0.3)
+    exponent: _number(
+        "exponent",
+        "Exponent",
+        "How stress grows with compression: 1 is a spring, as in the paper. In snow, at 2, twice the "
         "weight sinks 1.4 times as deep; in clay, at 0.5, four times",
         precision=2,
         step=5,
-        **_of_field("exponent"),
     )
-    densest: FloatProperty(
-        name="Densest Packing",
-        description="Part of the layer by which it can be pressed: what remains is packed as densely as it can be",
+    densest: _number(
+        "densest",
+        "Densest Packing",
+        "Part of the layer by which it can be pressed: what remains is packed as densely as it can be",
         subtype="FACTOR",
-        **_of_field("densest"),
     )
-    edge_width: FloatProperty(
-        name="Edges (m)", description=_EDGE_WIDTH, precision=3, soft_max=0.5, **_of_field("edge_width")
-    )
-    spread: FloatProperty(
-        name="Load Spread",
-        description="How far a load widens on its way down, sideways per depth: it evens out the floors of deep "
+    edge_width: _number("edge_width", "Edges (m)", _EDGE_WIDTH, precision=3, soft_max=0.5)
+    spread: _number(
+        "spread",
+        "Load Spread",
+        "How far a load widens on its way down, sideways per depth: it evens out the floors of deep "
         "prints. 0.5 is usual in snow; 0 is off",
         precision=2,
-        **_of_field("spread"),
     )
-    cohesionless: FloatProperty(
-        name="Cohesionless",
-        description="Part of the stiffness that comes from the ground's own weight, and so goes with the scene's "
+    cohesionless: _number(
+        "cohesionless",
+        "Cohesionless",
+        "Part of the stiffness that comes from the ground's own weight, and so goes with the scene's "
         "gravity: 1 for loose sand, 0 for what holds together",
         subtype="FACTOR",
-        **_of_field("cohesionless"),
     )
     packs: BoolProperty(
         name="Densest Packing",

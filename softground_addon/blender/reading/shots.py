@@ -29,12 +29,13 @@ from ...core.numerics.arrays import Array
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings
 from ...core.weather.felt_weather import weathering_of
-from .. import ground_slots, setting_paths, settings, tread_images
+from .. import ground_slots, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
 from ..characters.import_fixes import sizes_at_rest
 from ..ground import created_ground, ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
+from ..properties import setting_paths
 from ..response.character_keys import ReadRig, controls_of
 from ..reuse import reused
 from ..rigs.rig_mapping import require_armature

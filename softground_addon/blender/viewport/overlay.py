@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -35,6 +35,8 @@ FORCES: dict[str, Colour] = {
 CONTACT: Colour = (0.95, 0.25, 0.2, 0.45)
 RIM: Colour = (0.25, 0.75, 0.95, 0.35)
 PRESSED: Colour = (0.1, 0.08, 0.06, 0.6)
+FADED = 0.8
+"""Opacity of footfalls to come."""
 LINE, BOLD_LINE = 1.5, 3.0
 """Widths of lines [px, before the interface's scale]."""
 HEAD = 0.15
@@ -45,10 +47,8 @@ TEXT_SIZE = 13
 """Size of the numbers [px, before the interface's scale]."""
 
 
-"""The footfalls of each shot that was shown, as long as it is known."""
-
-
 def _footfalls(known: analysis.Analysis) -> list[overlay_shapes.Outline]:
+    """The footfalls of a shot, as long as it is known."""
     if known not in state.outlines:
         state.outlines[known] = overlay_shapes.footfalls(known.loads, known.shot.terrain)
     return state.outlines[known]
@@ -64,26 +64,33 @@ def draw_shapes() -> None:
     if predicted is None:
         return
     known = predicted.analysis
-    import gpu  # noqa: PLC0415  (not there in background)
-
     scene = settings.scene_of(context)
     frame = float(scene.frame_current)
     place = partial(in_scene, scene=scene, frame=known.shot.frame)
-    gpu.state.blend_set("ALPHA")
-    try:
+    with blending():
         if panel.show_cells:
             contact, rim, size = _cells(scene)
             for cells, colour in ((contact, CONTACT), (rim, RIM)):
                 _fill(place(overlay_shapes.squares(cells, size, known.shot.terrain)), colour)
         if panel.show_footfalls:
             for outline in _footfalls(known):
-                draw_line(place(closed(outline.points)), _faded(SIDES[outline.side], 0.8), LINE)
+                draw_line(place(closed(outline.points)), (*SIDES[outline.side][:3], FADED), LINE)
         if panel.show_soles:
             for outline in overlay_shapes.soles(known.loads, frame):
                 draw_line(place(closed(outline.points)), SIDES[outline.side], BOLD_LINE)
         if panel.show_forces:
             for arrow in overlay_shapes.arrows(known.loads, frame):
                 _arrow(place(arrow.start), place(arrow.end), FORCES[arrow.kind])
+
+
+@contextmanager
+def blending() -> Iterator[None]:
+    """What is drawn within lets what is behind it show through."""
+    import gpu  # noqa: PLC0415  (not there in background)
+
+    gpu.state.blend_set("ALPHA")
+    try:
+        yield
     finally:
         gpu.state.blend_set("NONE")
 
@@ -94,15 +101,12 @@ def draw_pressed() -> None:
     pressing = state.pressing
     if pressing is None or pressing.scene != context.scene.name:
         return
-    import gpu  # noqa: PLC0415
-
     for footprint in pressing.footprints[len(pressing.shapes) :]:
         pressing.shapes.append(_triangles(corners_of(footprint, pressing, context.scene)))
     if context.space_data.overlay.show_overlays:
-        gpu.state.blend_set("ALPHA")
-        for triangles in pressing.shapes:
-            _draw(triangles, PRESSED)
-        gpu.state.blend_set("NONE")
+        with blending():
+            for triangles in pressing.shapes:
+                _draw(triangles, PRESSED)
 
 
 def corners_of(footprint: Footprint, pressing: session.Pressing, scene: bpy.types.Scene) -> Array:
@@ -126,22 +130,29 @@ def draw_numbers() -> None:
     if predicted is None:
         return
     known = predicted.analysis
+    for number, outline in enumerate(_footfalls(known), start=1):
+        middle = in_scene(outline.middle, settings.scene_of(context), known.shot.frame)
+        draw_number(number, middle, SIDES[outline.side], centred=True)
+
+
+def draw_number(number: int, place: Array, colour: Colour, *, centred: bool = False) -> None:
+    """A number at a place in the scene (3,); one that is centred has a shadow."""
     import blf  # noqa: PLC0415
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
+    context: Any = bpy.context
+    at = location_3d_to_region_2d(context.region, context.region_data, Vector(place.tolist()))
+    if at is None:
+        return
     blf.size(0, TEXT_SIZE * context.preferences.system.ui_scale)
-    blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
-    for number, outline in enumerate(_footfalls(known), start=1):
-        middle = in_scene(outline.middle, settings.scene_of(context), known.shot.frame)
-        place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
-        if place is None:
-            continue
-        text = f"{number}"
-        width, height = blf.dimensions(0, text)
-        blf.position(0, place.x - width / 2, place.y - height / 2, 0)
-        blf.color(0, *SIDES[outline.side])
-        blf.draw(0, text)
+    if centred:
+        blf.enable(0, blf.SHADOW)
+        blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+        width, height = blf.dimensions(0, f"{number}")
+        at -= Vector((width, height)) / 2
+    blf.position(0, at.x, at.y, 0)
+    blf.color(0, *colour)
+    blf.draw(0, f"{number}")
     blf.disable(0, blf.SHADOW)
 
 
@@ -213,10 +224,6 @@ def closed(points: Array) -> Array:
     return np.concatenate([points, points[:1]])
 
 
-def _faded(colour: Sequence[float], alpha: float) -> Colour:
-    return (colour[0], colour[1], colour[2], colour[3] * alpha)
-
-
 class SOFTGROUND_OT_overlay(ReadingShot):
     """Show or hide predicted footfalls, soles, forces and cells in the viewport"""
 
@@ -275,4 +282,23 @@ def unregister() -> None:
         bpy.app.timers.unregister(read_again)
 
 
-CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again)
+class SOFTGROUND_PT_overlay(bpy.types.Panel):
+    """Parts of the overlay, among Blender's own"""
+
+    bl_label = "SoftGround"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "HEADER"
+    bl_parent_id = "VIEW3D_PT_overlay"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        panel = session.current()
+        icon = "HIDE_OFF" if panel.show_overlay else "HIDE_ON"
+        layout.operator("softground.overlay", icon=icon, depress=panel.show_overlay)
+        parts = layout.grid_flow(columns=2)
+        parts.active = panel.show_overlay
+        for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
+            parts.prop(panel, part)
+
+
+CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again, SOFTGROUND_PT_overlay)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -18,12 +18,13 @@ from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
 from ..baking import step_edits, step_preview
 from ..ground import baked_ground, baked_steps
+from ..operator_base import Checked
 from ..placement import from_scene, in_scene
 from ..remedies import said
 from ..state import state
 from ..translation import translated
 from . import overlay
-from .step_editing import EditJob, OnSteps, changed, toggle
+from .step_editing import EditJob, OnSteps, Wanted, changed, toggle
 
 TURN_STEP = 5.0
 """How far the mouse wheel turns a step that is dragged [deg]."""
@@ -33,6 +34,8 @@ _HINT = (
     "Drag: move a print   ·   Shift Click: extend the selection   ·   Drag beside prints: box select   ·   "
     "Wheel: rotate   ·   Shift: precise   ·   Esc: cancel"
 )
+WHITE = (1.0, 1.0, 1.0, 1.0)
+"""Colour of their numbers."""
 SLOW = 0.1
 """Of several steps only the outlines follow the mouse, until they are dropped, once pressing them took longer [s]."""
 FINE = 0.1
@@ -65,7 +68,7 @@ def _carried(edit: StepEdit, by: Array, turn: float) -> StepEdit:
     )
 
 
-class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
+class SOFTGROUND_OT_drag_step(OnSteps, Checked):
     """Pick a print in the viewport and drag it elsewhere; the wheel turns it, Esc cancels"""
 
     bl_idname = "softground.drag_step"
@@ -115,7 +118,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         """Outline the print under the mouse, and take hold of it at a click."""
         scene = settings.scene_of(context)
         if state.box:
-            return self._box(scene, event, region, view)
+            return self._box(scene.softground.ground, event, region, view)
         step = _under(baked_steps.of(scene.softground.ground), region, view, event) if region is not None else None
         if event.type == "MOUSEMOVE":
             name = step.name if step else ""
@@ -140,12 +143,12 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
 
-    def _box(self, scene: bpy.types.Scene, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
+    def _box(self, ground: bpy.types.Object, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
         """Follow the mouse with a box, and choose the steps whose middles are in it as the button is let go."""
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
         state.box = [state.box[0], (min(max(x, 0), region.width), min(max(y, 0), region.height))]
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            inside = _within(state.box, baked_steps.of(scene.softground.ground), region, view)
+            inside = _within(state.box, baked_steps.of(ground), region, view)
             names = [*(session.chosen_steps() if event.shift else ()), *inside]
             session.choose_steps(names[0] if names else "", names)
             state.box = ()
@@ -198,12 +201,9 @@ class SOFTGROUND_OT_drop_steps(OnSteps, EditJob):
     bl_label = "Drag in Viewport"
     bl_options = {"INTERNAL", "UNDO"}
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
         edits = state.edits
-        return changed(
-            scene.softground.ground,
-            [(step, edits[step.name]) for step in baked_steps.of(scene.softground.ground) if step.name in edits],
-        ), []
+        return changed(ground, [(step, edits[step.name]) for step in baked_steps.of(ground) if step.name in edits]), []
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
         try:
@@ -285,16 +285,11 @@ def draw_outlines() -> None:
     if context.scene is None or not (state.picking or session.current().step):
         return
     place = partial(in_scene, scene=context.scene, frame=baked_steps.frame_of(context.scene.softground.ground))
-    import gpu  # noqa: PLC0415  (not there in background)
-
-    gpu.state.blend_set("ALPHA")
-    try:
+    with overlay.blending():
         for step, edit, is_chosen in _outlined(context.scene.softground.ground):
             width = overlay.BOLD_LINE if is_chosen else overlay.LINE
             colour = overlay.SIDES.get(step.side, overlay.SIDES[""])
             overlay.draw_line(place(overlay.closed(step.outline(edit))), colour, width)
-    finally:
-        gpu.state.blend_set("NONE")
 
 
 def draw_numbers() -> None:
@@ -302,18 +297,10 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if context.scene is None or not (state.picking or session.current().step):
         return
-    import blf  # noqa: PLC0415
-    from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
-
-    blf.size(0, overlay.TEXT_SIZE * context.preferences.system.ui_scale)
     ground = context.scene.softground.ground
     for step, edit, _ in _outlined(ground):
         middle = in_scene(step.outline(edit).mean(axis=0), context.scene, baked_steps.frame_of(ground))
-        place = location_3d_to_region_2d(context.region, context.region_data, Vector(middle.tolist()))
-        if place is not None:
-            blf.position(0, place.x, place.y, 0)
-            blf.color(0, 1.0, 1.0, 1.0, 1.0)
-            blf.draw(0, f"{step.number}")
+        overlay.draw_number(step.number, middle, WHITE)
     if state.box:
         (x, y), (other_x, other_y) = state.box
         corners = np.array([(x, y, 0), (other_x, y, 0), (other_x, other_y, 0), (x, other_y, 0)], float)

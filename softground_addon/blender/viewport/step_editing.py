@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from math import degrees, radians
 from typing import Any, ClassVar
@@ -30,27 +29,24 @@ from .. import jobs, session, settings
 from ..baking import step_edits, step_soles
 from ..ground import baked_ground, baked_steps
 from ..live import live
-from ..operator_base import OnBake
+from ..operator_base import Checked, OnBake
 from ..operators import show_prints
 from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..placement import from_scene
-from ..reading import analysis
 from ..remedies import said
-from ..translation import translated
+
+Wanted = tuple[Mapping[str, StepEdit], list[str]]
+"""Edits, and steps."""
 
 
 class OnSteps(OnBake):
     """Operators that change steps of the bake on the ground."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if there is a bake, and neither another one nor live mode is at work."""
+    def missing(cls, context: bpy.types.Context) -> str:
         if session.current().is_baking or live.is_on():
-            cls.poll_message_set(
-                translated("A bake is running, or live mode is on: wait, or press Keep or Discard first")
-            )
-            return False
-        return super().poll(context)
+            return "A bake is running, or live mode is on: wait, or press Keep or Discard first"
+        return super().missing(context)
 
 
 class OnStep(OnSteps):
@@ -60,13 +56,13 @@ class OnStep(OnSteps):
         name="Steps", description="Ids of the steps, one per line; the selected ones if empty", options={"HIDDEN"}
     )
 
-    def chosen(self, scene: bpy.types.Scene) -> list[baked_steps.BakedStep]:
+    def chosen(self, ground: bpy.types.Object) -> list[baked_steps.BakedStep]:
         """The steps that are meant, first the one that the panel shows."""
         if not self.step:
-            self.step = "\n".join(step.name for step in baked_steps.chosen(scene.softground.ground))
+            self.step = "\n".join(step.name for step in baked_steps.chosen(ground))
         if not self.step:
             raise InputError("Select a step first, in the list of steps.")
-        steps = {step.name: step for step in baked_steps.of(scene.softground.ground)}
+        steps = {step.name: step for step in baked_steps.of(ground)}
         for name in self.step.split("\n"):
             if name not in steps:
                 raise InputError(f"The bake has no step '{name}': select one in the list of steps.")
@@ -84,27 +80,22 @@ class EditJob(ModalJob):
 
     stage_names: ClassVar[dict[str, str]] = STAGE_NAMES | {"sample": "Reading the bake"}
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return analysis.own_changes(scene)
-
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
-        return _edited(scene, *self.wanted(scene))
+        ground = scene.softground.ground
+        edits, chosen = self.wanted(ground)
+        if edits != baked_ground.record_of(ground).edits:
+            bake = yield from step_edits.reading(scene)
+            yield from step_edits.editing(scene, bake, edits)
+        return chosen
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        """All edits that the bake is to have, and the steps that are chosen then, none for those that are."""
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        """All edits that the bake is to have, and the steps that are chosen then, none for the same."""
         raise NotImplementedError
 
     def _show(self, result: list[str]) -> None:
         if result:
             session.choose_steps(result[0], result)
         redraw()
-
-
-def _edited(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], chosen: list[str]) -> jobs.Job[list[str]]:
-    if edits != baked_ground.record_of(scene.softground.ground).edits:
-        bake = yield from step_edits.reading(scene)
-        yield from step_edits.editing(scene, bake, edits)
-    return chosen
 
 
 def changed(
@@ -138,7 +129,7 @@ def toggle(name: str) -> None:
     session.choose_steps(names[0] if names else "", names)
 
 
-class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_choose_step(OnBake, Checked):
     """Select this step, go to the frame where its foot has left the print, and centre the view on it.
     Shift: add it to the selection, or remove it"""
 
@@ -165,8 +156,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
         if step.name in session.chosen_steps():
             scene.frame_set(step.there_from)
             show_prints.centre(context.area, step)
-        session.redraw()
-        session.redraw(region_type="WINDOW")
+        redraw()
         return {"FINISHED"}
 
 
@@ -176,18 +166,19 @@ class SOFTGROUND_OT_mute_step(OnStep, EditJob):
     bl_idname = "softground.mute_step"
     bl_label = "Mute Step"
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        steps = self.chosen(scene)
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        steps = self.chosen(ground)
         mute = not steps[0].edit.mute
-        return changed(scene.softground.ground, [(step, replace(step.edit, mute=mute)) for step in steps]), []
+        return changed(ground, [(step, replace(step.edit, mute=mute)) for step in steps]), []
 
 
 def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
     """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
     scene = settings.scene_of(context)
-    steps = baked_steps.of(scene.softground.ground)
+    ground = scene.softground.ground
+    steps = baked_steps.of(ground)
     meshes = {
-        *step_soles.names(scene.objects, scene.softground.ground),
+        *step_soles.names(scene.objects, ground),
         *mesh_soles({step.name: step.edit for step in steps}),
     }
     names = [*sorted(steps[0].feet if steps else ()), *sorted(meshes)]
@@ -246,7 +237,7 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
         try:
-            edit = self.chosen(settings.scene_of(context))[0].edit
+            edit = self.chosen(settings.options_of(context).ground)[0].edit
         except InputError as error:
             self.report({"ERROR"}, said(error))
             return {"CANCELLED"}
@@ -261,8 +252,8 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         result: set[str] = run(context)
         return result
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        steps = self.chosen(scene)
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        steps = self.chosen(ground)
         wanted = {
             "strength": settings.typed(self.strength),
             "move_m": (settings.typed(self.move[0]), settings.typed(self.move[1])),
@@ -275,12 +266,12 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         new = {key: value for key, value in wanted.items() if value != getattr(steps[0].edit, key)}
         mesh = None
         if "sole" in new:
-            new["mesh"] = mesh = _mesh(scene, steps, self.sole)
-        edits = changed(scene.softground.ground, [(step, replace(step.edit, **new)) for step in steps])
+            new["mesh"] = mesh = _mesh(ground, steps, self.sole)
+        edits = changed(ground, [(step, replace(step.edit, **new)) for step in steps])
         return with_meshes(edits, {self.sole: mesh}) if mesh else edits, []
 
 
-def _mesh(scene: bpy.types.Scene, steps: Sequence[baked_steps.BakedStep], sole: str) -> MeshSole | None:
+def _mesh(ground: bpy.types.Object, steps: Sequence[baked_steps.BakedStep], sole: str) -> MeshSole | None:
     """The sole of the mesh that is to press some steps; None for a foot of the bake, and for their own.
 
     Raises
@@ -297,14 +288,15 @@ def _mesh(scene: bpy.types.Scene, steps: Sequence[baked_steps.BakedStep], sole: 
             )
     if sole in steps[0].feet:
         return None
+    scene = settings.scene_of(bpy.context)
     obj = step_soles.object_of(scene.objects, sole)
-    soles = mesh_soles(baked_ground.edits_of(scene.softground.ground))
+    soles = mesh_soles(baked_ground.edits_of(ground))
     if obj is None and sole not in soles:
         feet = ", ".join(sorted(steps[0].feet)) or "none"
         raise InputError(f"The bake has no sole '{sole}': choose one of {feet}, or a mesh object in this scene.")
     if obj is None:
         return soles[sole]
-    return step_soles.read(obj, scene.softground.ground, scene.unit_settings.scale_length)
+    return step_soles.read(obj, ground, scene.unit_settings.scale_length)
 
 
 class SOFTGROUND_OT_duplicate_step(OnStep, EditJob):
@@ -313,8 +305,8 @@ class SOFTGROUND_OT_duplicate_step(OnStep, EditJob):
     bl_idname = "softground.duplicate_step"
     bl_label = "Duplicate"
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        return copied(scene.softground.ground, [(step, _moved(step, step.ahead())) for step in self.chosen(scene)])
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        return copied(ground, [(step, _moved(step, step.ahead())) for step in self.chosen(ground)])
 
 
 class SOFTGROUND_OT_add_step(OnStep, EditJob):
@@ -329,9 +321,9 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
         self.sole = ""  # that of the step, and not what was chosen for the one before
         return super().invoke(context, event)
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        step = self.chosen(scene)[0]
-        cursor = from_scene(np.array(scene.cursor.location), scene, baked_steps.frame_of(scene.softground.ground))[:2]
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        scene, step = settings.scene_of(bpy.context), self.chosen(ground)[0]
+        cursor = from_scene(np.array(scene.cursor.location), scene, baked_steps.frame_of(ground))[:2]
         edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
         shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
         if abs(shift) > LONGEST_SHIFT:
@@ -340,8 +332,8 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
                 "later: go to a nearer frame, or choose another step."
             )
         if self.sole:
-            edit = replace(edit, sole=self.sole, mesh=_mesh(scene, [step], self.sole))
-        return copied(scene.softground.ground, [(step, replace(edit, mute=False, shift_frames=shift))])
+            edit = replace(edit, sole=self.sole, mesh=_mesh(ground, [step], self.sole))
+        return copied(ground, [(step, replace(edit, mute=False, shift_frames=shift))])
 
 
 def _moved(step: baked_steps.BakedStep, move: Sequence[float]) -> StepEdit:
@@ -359,8 +351,8 @@ class SOFTGROUND_OT_reset_step(OnStep, EditJob):
     bl_idname = "softground.reset_step"
     bl_label = "Reset Step"
 
-    def wanted(self, scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
-        return changed(scene.softground.ground, [(step, None) for step in self.chosen(scene)]), []
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
+        return changed(ground, [(step, None) for step in self.chosen(ground)]), []
 
 
 class SOFTGROUND_OT_reset_steps(OnSteps, EditJob):
@@ -369,7 +361,7 @@ class SOFTGROUND_OT_reset_steps(OnSteps, EditJob):
     bl_idname = "softground.reset_steps"
     bl_label = "Reset All Steps"
 
-    def wanted(self, _scene: bpy.types.Scene) -> tuple[Mapping[str, StepEdit], list[str]]:
+    def wanted(self, ground: bpy.types.Object) -> Wanted:
         return {}, []
 
 

@@ -18,6 +18,7 @@ from ..ground.heightfield import HeightField
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import Window
 from ..imprints.sole_points import SolePoints, sole_points
+from ..numerics.arrays import Mask
 from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
 from ..pressing.contact_layout import ContactLayout
@@ -197,11 +198,14 @@ class EditedSteps:
         """Steps that press cells at a frame or later."""
         if not len(cells):
             return []
-        column, row, columns, rows = window_of(cells).expanded(self._weather_reach)
-        low, size = self._windows[:, :2], self._windows[:, 2:]
-        near = (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
-        near &= self._frames[:, 1] >= since
+        near = self._over(window_of(cells).expanded(self._weather_reach)) & (self._frames[:, 1] >= since)
         return [n for n in np.flatnonzero(near).tolist() if self._reads(n, None, cells)]
+
+    def _over(self, window: Window) -> Mask:
+        """The steps as they were baked, (N,), that lie over a window."""
+        low, size = self._windows[:, :2], self._windows[:, 2:]
+        before_end = low < (window.column + window.columns, window.row + window.rows)
+        return np.asarray((before_end & (low + size > (window.column, window.row))).all(axis=1))
 
     def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
         """True if a step, as it was baked or as it is now, presses some cells."""
@@ -280,11 +284,7 @@ class EditedSteps:
     ) -> list[ReplayedStep]:
         """The prints around some steps that stay as they were baked."""
         windows = [layout.window(self._cells).expanded(self._margin) for layout in layouts.values()]
-        low, size = self._windows[:, :2], self._windows[:, 2:]
-        near = np.zeros(len(low), bool)
-        for column, row, columns, rows in windows:
-            near |= (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
-        near &= self._frames[:, 0] <= end
+        near = np.any([self._over(window) for window in windows], axis=0) & (self._frames[:, 0] <= end)
         around = np.flatnonzero(near).tolist()
         self._unpacked = {n: self._unpacked.get(n) or ReplayedStep(self._footprints[n]) for n in around}
         return [baked for n, baked in self._unpacked.items() if n not in members]

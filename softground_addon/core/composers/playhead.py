@@ -17,7 +17,7 @@ from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..pressing.ground_cells import UndisturbedCells
 from ..record.footprints import Footprint
-from .simulation import FrameResult, Simulation
+from .simulation import FrameResult, simulate
 
 NEWEST = 48
 """Frames at the end of what is shown that are pressed anew first: two steps of a walk at least."""
@@ -183,7 +183,8 @@ class Playhead:
 
     def press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press loads into the ground as it was before, frame by frame."""
-        return Simulation(self._soft_ground, self._before.copy(), self.undisturbed).run(loads)
+        before = self._before.copy()
+        return simulate(loads, self._soft_ground, before.cell_size, pressed=before, undisturbed=self.undisturbed)
 
 
 @sliced

@@ -61,7 +61,14 @@ class FrameResult:
     forces: tuple[Array, ...]
 
 
-def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Iterator[FrameResult]:
+def simulate(
+    loads: Sequence[CharacterLoads],
+    ground: SoftGround,
+    cell_size: float,
+    *,
+    pressed: HeightField | None = None,
+    undisturbed: UndisturbedCells | None = None,
+) -> Iterator[FrameResult]:
     """Press footprints into the ground, frame by frame.
 
     Each step of the loads presses over the time that ends at it; their first is the undisturbed ground.
@@ -72,6 +79,10 @@ def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: flo
         Characters that share the ground, on time grids of the same step.
     cell_size : float
         Side of a cell [m].
+    pressed : HeightField, optional
+        What was pressed of it before, such as from `footprints.recompose`; it is worked on.
+    undisturbed : UndisturbedCells, optional
+        The cells of its terrain, where another simulation has looked some of them up.
 
     Yields
     ------
@@ -84,49 +95,30 @@ def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: flo
     InputError
         If the cell size is not positive, or the characters do not share a time grid.
     """
-    yield from Simulation(ground, HeightField(cell_size)).run(loads)
-
-
-class Simulation:
-    """A ground that characters press.
-
-    Parameters
-    ----------
-    state : HeightField
-        What was pressed of it so far, empty or from `footprints.recompose`; it is worked on.
-    undisturbed : UndisturbedCells, optional
-        The cells of its terrain, where another simulation has looked some of them up.
-    """
-
-    def __init__(self, ground: SoftGround, state: HeightField, undisturbed: UndisturbedCells | None = None) -> None:
-        if undisturbed is None:
-            undisturbed = UndisturbedCells(ground, state.cell_size)
-        self._solver = GroundSolver(ground, state, undisturbed)
-
-    def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
-        """Press a motion; see `simulate`."""
-        grid = time_grid(loads)
-        waiting = _Waiting(loads, grid)
-        contacts: list[OpenContact] = []
-        start = 1
-        for end in grid.shown + 1:
-            contacts += waiting.due(int(end))
-            frame = float(grid.frames[end - 1])
-            is_last = end == grid.shown[-1] + 1
-            changed, ended = self._solver.step(contacts, start, int(end), frame, grid.timing, is_last=is_last)
-            if weathered := self._solver.weathered:
-                for contact in ended:
-                    last = float(contact.layout.steps.frames[-1])
-                    weathered.ended(last, contact.compressed, contact.area, contact.made_of)
-            start = int(end)
-            yield FrameResult(
-                frame,
-                self._solver.state,
-                changed,
-                tuple(self._solver.contact),
-                tuple(contact.footprint() for contact in ended if contact.recorder),
-                *_state_at(loads, grid.offsets, start - 1),
-            )
+    state = HeightField(cell_size) if pressed is None else pressed
+    solver = GroundSolver(ground, state, undisturbed or UndisturbedCells(ground, cell_size))
+    grid = time_grid(loads)
+    waiting = _Waiting(loads, grid)
+    contacts: list[OpenContact] = []
+    start = 1
+    for end in grid.shown + 1:
+        contacts += waiting.due(int(end))
+        frame = float(grid.frames[end - 1])
+        is_last = end == grid.shown[-1] + 1
+        changed, ended = solver.step(contacts, start, int(end), frame, grid.timing, is_last=is_last)
+        if weathered := solver.weathered:
+            for contact in ended:
+                last = float(contact.layout.steps.frames[-1])
+                weathered.ended(last, contact.compressed, contact.area, contact.made_of)
+        start = int(end)
+        yield FrameResult(
+            frame,
+            solver.state,
+            changed,
+            tuple(solver.contact),
+            tuple(contact.footprint() for contact in ended if contact.recorder),
+            *_state_at(loads, grid.offsets, start - 1),
+        )
 
 
 class _Waiting:

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground import crumbs, surfaces
+from ..ground import surfaces
 from ..ground.surfaces import ThrownMatter
+from ..meshing import crumbs
 from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint

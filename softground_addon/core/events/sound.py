@@ -98,6 +98,11 @@ class SoundStep:
     carried: str = ""
     film: float = 0.0
 
+    @property
+    def begin(self) -> float:
+        """Time from which it sounds [s]."""
+        return float(self.time[0]) if self.struck is None else self.struck
+
 
 def steps_of(
     footprints: Mapping[str, Footprint], table: Sequence[Event], *, frame_rate: float, first_frame: float
@@ -196,7 +201,7 @@ def footsteps(steps: Sequence[SoundStep], seconds: float, recordings: Sequence[t
 
 def step_sound(step: SoundStep) -> tuple[int, Array]:
     """The sound of one step: the sample at which it begins, and its samples (N,)."""
-    begin = step.time[0] if step.struck is None else step.struck
+    begin = step.begin
     end = max(float(step.time[-1]), step.lifted or 0.0, begin) + TAIL
     clock = begin + np.arange(round((end - begin) * RATE)) / RATE
     voice, random = voice_of(step.surface), _random(step)
@@ -343,6 +348,5 @@ def _recorded(step: SoundStep, recordings: Sequence[tuple[str, Array]], last: in
     choice = fitting or list(range(len(recordings)))
     others = [number for number in choice if number != last] or choice
     number = others[int(_random(step).integers(0, len(others)))]
-    begin = step.time[0] if step.struck is None else step.struck
     loud = 0.0 if step.struck is None else min(1.0, LOUDNESS * loudness(step))
-    return round(begin * RATE), loud * recordings[number][1], number
+    return round(step.begin * RATE), loud * recordings[number][1], number

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..numerics.arrays import Array, Indices
 from ..numerics.intervals import in_order
@@ -31,6 +30,10 @@ class Places:
         self._rows, self._columns = row[first], column[first]
         self._first = np.append(first, len(self._order))
 
+    def at(self, points: Indices) -> Array:
+        """Positions of some of them, (N, 2) [m]."""
+        return np.column_stack([self.x[points], self.y[points]])
+
     def within(self, window: Window, cell_size: float) -> Indices:
         """Places in the cells of a window, (N,), ascending."""
         low = np.floor(np.array([window.column, window.row]) * cell_size / self.BIN)
@@ -38,15 +41,10 @@ class Places:
         near = (self._columns >= low[0]) & (self._columns <= high[0]) & (self._rows >= low[1]) & (self._rows <= high[1])
         runs = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
         points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *runs]))
-        return points[inside(window, cell_size, self.x[points], self.y[points])]
+        column, row = np.floor(self.at(points) / cell_size).astype(np.intp).T
+        return points[window.holds(row, column)]
 
     def window(self, points: Indices, cell_size: float) -> Window:
         """The cells around some of the places."""
-        place = self.x[points], self.y[points]
-        return Window.around(np.min(place, axis=1), np.max(place, axis=1), cell_size)
-
-
-def inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
-    """True for places in the cells of a window."""
-    column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
-    return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)
+        place = self.at(points)
+        return Window.around(place.min(axis=0), place.max(axis=0), cell_size)

@@ -49,7 +49,7 @@ class Factors(NamedTuple):
     depth: Array
     rim: Array
 
-    def softness(self, exponent: float = 1.0) -> Array:
+    def softness(self, exponent: float) -> Array:
         """Compression per that of the material under the same stress, which grows with a power of the strain."""
         return self.depth / (self.stiffness if exponent == 1.0 else self.stiffness ** (1.0 / exponent))
 

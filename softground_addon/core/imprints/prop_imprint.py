@@ -53,9 +53,7 @@ class GroundUnder:
         return np.asarray(samples.reshape(rows, self.divisions, columns, self.divisions).mean(axis=(1, 3)))
 
 
-def ground_under(
-    prop: Prop, pose: Array, cells: Surface, reach: float, factors: Factors | None = None
-) -> GroundUnder | None:
+def ground_under(prop: Prop, pose: Array, cells: Surface, reach: float, factors: Factors | None) -> GroundUnder | None:
     """The ground that a body presses at a pose; None if it is over none.
 
     Parameters

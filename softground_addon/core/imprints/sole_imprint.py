@@ -25,7 +25,7 @@ NEGLIGIBLE_SHIFT = 0.02
 
 
 def cell_coverage(
-    patches: Iterable[PatchOverCells], fine: Window, *, sinkage: Array, tolerance: float, divisions: int = 1
+    patches: Iterable[PatchOverCells], fine: Window, *, sinkage: Array, tolerance: float, divisions: int
 ) -> Single:
     """Fraction of each cell that is in contact, at each of N steps.
 

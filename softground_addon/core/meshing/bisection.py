@@ -91,7 +91,7 @@ class Bisection:
         Points of the given edges.
     """
 
-    def __init__(self, vertices: Array, triangles: Indices, parts: int = 1, grain: float = 1.0) -> None:
+    def __init__(self, vertices: Array, triangles: Indices, parts: int, grain: float) -> None:
         self.vertex, local = np.unique(triangles, return_inverse=True)
         self.points = vertices[self.vertex]
         self.corner: Numbers = local.reshape(-1, 3).astype(np.int32)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
-from ..ground.places import Places, inside
+from ..ground.places import Places
 from ..ground.sparse_grid import Window
 from ..numerics import bilinear
 from ..numerics.arrays import Array, Indices, Mask
@@ -204,7 +204,8 @@ def _moving(footprint: Footprint, reach: Window) -> Mask:
 
 def _reached(reach: Window, moving: Mask | None, cell_size: float, x: Array, y: Array) -> Mask:
     """True at places (N,) that a footprint moves: all in its reach, or those in its moving cells."""
-    within = inside(reach, cell_size, x, y)
+    column, row = np.floor(np.stack([x, y]) / cell_size).astype(np.intp)
+    within = reach.holds(row, column)
     return within if moving is None else within & moving[reach.cells_under(x, y, cell_size)]
 
 

@@ -118,18 +118,13 @@ class ContactSteps:
     coded: Packed[np.int32] = Packed()
 
     @property
-    def width(self) -> int:
-        """Values at each step."""
-        return width_of(self.pressing)
-
-    @property
     def count(self) -> int:
         """Number of steps, with those of the approach."""
-        return len(self.coded) // self.width
+        return len(self.coded) // width_of(self.pressing)
 
     def steps(self, frames: Array) -> Steps:
         """The steps, at these scene frames (N,)."""
-        values = decoded(self.coded.reshape(-1, self.width))
+        values = decoded(self.coded.reshape(-1, width_of(self.pressing)))
         parts, before = len(self.pressing.flat), self.approach
         of_poses = values[:, : _POSE * parts].reshape(len(values), parts, _POSE)
         poses = np.zeros((len(values), parts, 4, 4))

@@ -7,7 +7,7 @@ import json
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -135,7 +135,16 @@ class BakeRecord:
     @cached_property
     def steps(self) -> list[EditableStep]:
         """All steps, and after them the copies of some."""
-        return steps_of(self.footprints, self.edits, self.pressed_again, self.thrown)
+        changes, count = step_edits.edits_by_number(self.footprints, self.edits), len(self.footprints)
+        steps = []
+        for number in (*range(count), *(n for n in changes if n >= count)):
+            edit, copy = changes.get(number, step_edits.UNCHANGED), number // count
+            baked = self.footprints[number % count]
+            edited = None if edit.mute else self.pressed_again.get(number, None if copy else baked)
+            lacking = self.thrown.get(number, {}) if edited else {}
+            edited = step_throws.booked(edited, sum(lacking.values())) if edited and lacking else edited
+            steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, edited, edit, copy > 0, lacking))
+        return steps
 
 
 @dataclass(frozen=True)
@@ -163,24 +172,6 @@ class EditableStep:
     edit: step_edits.StepEdit
     is_copy: bool
     thrown: Mapping[str, float]
-
-
-def steps_of(
-    footprints: Sequence[Footprint],
-    edits: Mapping[str, step_edits.StepEdit],
-    pressed_again: Mapping[int, Footprint | None],
-    thrown: Mapping[int, Mapping[str, float]],
-) -> list[EditableStep]:
-    """The steps of a record, and after them the copies of some."""
-    changes, count = step_edits.edits_by_number(footprints, edits), len(footprints)
-    steps = []
-    for number in (*range(count), *(n for n in changes if n >= count)):
-        edit, baked, copy = changes.get(number, step_edits.UNCHANGED), footprints[number % count], number // count
-        edited = None if edit.mute else pressed_again.get(number, None if copy else baked)
-        lacking = thrown.get(number, {}) if edited else {}
-        edited = step_throws.booked(edited, sum(lacking.values())) if edited and lacking else edited
-        steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, edited, edit, copy > 0, lacking))
-    return steps
 
 
 @sliced
@@ -240,8 +231,7 @@ def load(content: bytes) -> BakeRecord:
         if type(of_soft) is not int or not 0 <= of_soft <= len(names):
             raise ValueError("more steps on floors than it has")
         baked = _count_baked(of_soft - len(carved), again)
-        if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in carved):
-            raise ValueError("carves of steps that it does not have")
+        _check_numbers(carved, baked)
         how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
@@ -300,8 +290,7 @@ def _thrown(rows: list[Any], baked: int) -> dict[int, dict[str, float]]:
     thrown = {
         number: {str(phase): float(volume) for phase, volume in dict(volumes).items()} for number, volumes in rows
     }
-    if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in thrown):
-        raise ValueError("debris of steps that it does not have")
+    _check_numbers(thrown, baked)
     if not all(0 <= volume < np.inf for volumes in thrown.values() for volume in volumes.values()):
         raise ValueError("debris of no volume")
     return thrown
@@ -311,11 +300,15 @@ def _count_baked(count: int, again: list[tuple[Any, Any]]) -> int:
     """Number of `count` footprints that were baked, the others being pressed again; ValueError where that cannot be."""
     baked = count - sum(has_print is True for _, has_print in again)
     numbers = [number for number, _ in again]
-    if (
-        any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in numbers)
-        or sorted(set(numbers)) != numbers
-    ):
-        raise ValueError("steps were pressed again that it does not have")
+    _check_numbers(numbers, baked)
+    if sorted(set(numbers)) != numbers:
+        raise ValueError("steps were pressed again twice")
     if any(type(has_print) is not bool for _, has_print in again):
         raise ValueError("it does not say which steps are left")
     return baked
+
+
+def _check_numbers(numbers: Iterable[Any], baked: int) -> None:
+    """Raise ValueError where some are no numbers of its steps, of which so many were baked, or of their copies."""
+    if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in numbers):
+        raise ValueError("it names steps that it does not have")

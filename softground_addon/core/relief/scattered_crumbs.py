@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground import crumbs, surfaces
+from ..ground import surfaces
+from ..meshing import crumbs
 from ..numerics.arrays import Array
 from .lattice_noise import hashed, uniform
 from .layers import Around

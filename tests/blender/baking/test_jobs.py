@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.baking import bake_job
+from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground, baked_steps, created_ground
 from softground_addon.blender.jobs import Progress, meanwhile, run
 from softground_addon.blender.live import live, live_start
@@ -124,7 +124,7 @@ def live_job(scene, *, keep):
         live.begin((yield from live_start.starting(scene)))
     else:
         with analysis.own_changes(scene):
-            yield from state.live.keeping(scene)
+            yield from state.live.keeping()
             live.forget()
 
 
@@ -153,6 +153,11 @@ def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
     assert steps[0][0] < at_pace(LONGEST_STEP), steps[:5]
 
 
+def edited(scene, edits):
+    """What a button does that changes steps."""
+    yield from step_edits.editing(scene, (yield from step_edits.reading(scene)), edits)
+
+
 @pytest.mark.slow
 @pytest.mark.alone
 def test_no_step_of_weather_and_edits_on_a_million_vertices_takes_long(scene):
@@ -166,10 +171,10 @@ def test_no_step_of_weather_and_edits_on_a_million_vertices_takes_long(scene):
     run(bake_job.bake(scene))
     turned = [(step, StepEdit(turn_deg=5.0)) for step in baked_steps.of(ground)]
     assert len(turned) > 10
-    run(step_editing._edited(scene, step_editing.changed(ground, turned), []))
+    run(edited(scene, step_editing.changed(ground, turned)))
     muted = step_editing.changed(ground, [(baked_steps.of(ground)[5], StepEdit(mute=True))])
     for edits in (muted, {}):
-        steps = steps_of(step_editing._edited(scene, edits, []))
+        steps = steps_of(edited(scene, edits))
         assert steps[0][0] < at_pace(LONGEST_IN_A_WINDOW), steps[:5]
     for _ in ("added", "renewed"):
         steps = steps_of(ground_weather.adding(ground, preset="SNOWFALL"))

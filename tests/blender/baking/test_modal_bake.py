@@ -11,8 +11,8 @@ from softground_addon.blender import jobs, reuse, session
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.operators import modal_bake, modal_job
-from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.setup import shot_setup as operators
 from softground_addon.blender.state import state
 from softground_addon.core.composers import pressed_shot
 from softground_addon.core.errors import InputError

@@ -22,7 +22,7 @@ from softground_addon.core.record.edits import StepEdit
 from softground_addon.core.record.footprints import NEVER
 from softground_addon.core.weather import weather
 from tests.blender.ground.test_hard_ground import LOW, box, listed, over_a_crate
-from tests.blender.grounds import bake, heights
+from tests.blender.grounds import bake, heights, steps_on
 
 HEIGHT = 0.2
 
@@ -417,7 +417,7 @@ def state_of(obj):
 def test_marks_follow_edits_of_steps_at_once_as_another_bake_would_have_them(scene):
     obj, frame = marks_object.of(scene.softground.ground), 84
     before, count = state_of(obj), there(at(scene, frame))
-    names = [step.name for step in baked_ground.steps_of(scene.softground.ground)]
+    names = [step.name for step in steps_on(scene.softground.ground)]
     edit(scene, {names[0]: StepEdit(mute=True)})
     fewer = state_of(obj)
     assert 0.0 < fewer[1].sum() < before[1].sum()
@@ -444,7 +444,7 @@ def test_marks_in_edit_mode_refuse_bakes_edits_and_clear_and_nothing_changes(sce
     bpy.context.view_layer.objects.active = twin
     twin.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
-    name = baked_ground.steps_of(ground)[0].name
+    name = steps_on(ground)[0].name
     for job in (lambda: bake(scene), lambda: edit(scene, {name: StepEdit(mute=True)}), bpy.ops.softground.clear_bake):
         with pytest.raises((InputError, RuntimeError), match=r"'SoftGround Marks' beside ground .* is in Edit Mode"):
             job()
@@ -458,7 +458,7 @@ def test_marks_that_the_user_has_changed_stay_as_they_are_with_edits_of_steps(sc
     obj = marks_object.of(scene.softground.ground)
     obj.data.attributes.remove(obj.data.attributes["share"])
     before = state_of(obj)
-    edit(scene, {step.name: StepEdit(mute=True) for step in baked_ground.steps_of(scene.softground.ground)})
+    edit(scene, {step.name: StepEdit(mute=True) for step in steps_on(scene.softground.ground)})
     assert (state_of(obj)[1] == before[1]).all()
 
 
@@ -468,7 +468,7 @@ def test_marks_that_the_user_has_changed_stay_as_they_are_with_edits_of_steps(sc
 def test_marks_of_steps_that_are_moved_are_those_of_another_bake(scene, change):
     obj = marks_object.of(scene.softground.ground)
     before = state_of(obj)
-    edit(scene, {step.name: change for step in baked_ground.steps_of(scene.softground.ground)})
+    edit(scene, {step.name: change for step in steps_on(scene.softground.ground)})
     edited = state_of(obj)
     bake(scene)
     again = state_of(obj)

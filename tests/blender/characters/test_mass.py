@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.characters.contact_editing import add_bone_contacts, add_object_contacts
-from softground_addon.blender.operators.character_editing import suggested_mass
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.setup.character_editing import suggested_mass
 from tests.blender import shots
 from tests.blender.baking.test_self_check import codes
 from tests.blender.characters.test_recognition import box

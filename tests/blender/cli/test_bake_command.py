@@ -7,7 +7,7 @@ import bpy
 import pytest
 
 from softground_addon.blender.ground import ground_mesh
-from softground_addon.blender.operators import shot_setup as operators
+from softground_addon.blender.setup import shot_setup as operators
 from tests.blender import fingerprints, shots
 
 ROOT = Path(__file__).parents[3]

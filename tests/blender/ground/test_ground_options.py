@@ -4,10 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_presets, jobs, setting_paths, settings
+from softground_addon.blender import ground_presets, jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import painted_ground
-from softground_addon.blender.properties import material
+from softground_addon.blender.properties import material, setting_paths
 from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.material import MATERIAL_RANGES, GroundMaterial
@@ -45,7 +45,7 @@ def test_every_field_of_the_material_is_a_setting_with_a_tooltip_and_off_beyond_
         assert (known[name].hard_min, known[name].hard_max) == pytest.approx((low, high))
     plain = GroundMaterial(1.0, 0.0, 1.0)
     assert all(
-        getattr(settings.material_of(scene.softground), name) == 0
+        getattr(settings.material_of(scene.softground.material), name) == 0
         for name in MATERIAL_RANGES
         if name != "poisson_ratio" and getattr(plain, name) == 0
     )
@@ -54,9 +54,9 @@ def test_every_field_of_the_material_is_a_setting_with_a_tooltip_and_off_beyond_
 def test_a_preset_with_options_sets_them_and_the_next_one_takes_them_back(scene):
     ground_presets.apply_preset(scene.softground, find("loose_dry_sand"))
     assert scene.softground.material.repose_angle == pytest.approx(np.radians(32.0), abs=1e-4)
-    assert settings.material_of(scene.softground) == find("loose_dry_sand").material
+    assert settings.material_of(scene.softground.material) == find("loose_dry_sand").material
     ground_presets.apply_preset(scene.softground, find("snow"))
-    assert settings.material_of(scene.softground) == find("snow").material
+    assert settings.material_of(scene.softground.material) == find("snow").material
 
 
 def test_options_are_assigned_by_their_path(scene):

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat, ground_slots, jobs, preset_files, setting_paths, settings
+from softground_addon.blender import compat, ground_slots, jobs, preset_files, settings
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.carried import marks_object
 from softground_addon.blender.debris import debris_nodes, debris_object
@@ -19,6 +19,7 @@ from softground_addon.blender.mesh_arrays import positions
 from softground_addon.blender.output import sound_exports
 from softground_addon.blender.panels.ground_options_panel import SOFTGROUND_PT_regions
 from softground_addon.blender.playback import weather_inputs, weather_modifier, weather_nodes, weather_table
+from softground_addon.blender.properties import setting_paths
 from softground_addon.blender.weather import weather_regions
 from softground_addon.core.errors import InputError
 from softground_addon.core.events import wave_file

@@ -9,7 +9,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
 from softground_addon.blender.ground import baked_steps
-from softground_addon.blender.operators import sample_scene
+from softground_addon.blender.setup import sample_scene
 from tests.blender import fingerprints
 
 

@@ -29,7 +29,7 @@ from softground_addon.core.record.typical_depth import typical_of
 from tests.blender import command_line, fingerprints, shots
 from tests.blender.ground.test_ground_frames import WHERE, hung_up, moved
 from tests.blender.ground.test_hard_ground import HIGH, LOW, below, box, bytes_of, curves_of, lift
-from tests.blender.grounds import as_rendered, bake, plane, refusal
+from tests.blender.grounds import as_rendered, bake, plane, refusal, steps_on
 
 CRATE, DECK = "Crate", 0.2
 GRAZE = 4.0
@@ -279,7 +279,7 @@ def test_steps_are_edited_as_well_once_another_ground_was_listed(crate):
     scene = bpy.context.scene
     bake(scene)
     also(crate)
-    step = baked_ground.steps_of(scene.softground.ground)[0].name
+    step = steps_on(scene.softground.ground)[0].name
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step: StepEdit(strength=0.5)}))
     assert record_of(scene.softground.ground).edits == {step: StepEdit(strength=0.5)}
     assert not baked_ground.is_baked(crate)
@@ -936,7 +936,7 @@ def test_the_later_bake_is_heard_whatever_grounds_are_called_by_then_and_whichev
         bpy.ops.softground.live(keep=True)
     else:
         bake(scene)
-    step = baked_ground.steps_of(crate)[0]
+    step = steps_on(crate)[0]
     jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step.name: StepEdit(strength=0.5)}))
     also(floor)
     assert bake_report.baked_grounds(options) == [crate]

@@ -8,10 +8,11 @@ from sample_scenes.character import create_character
 from sample_scenes.dog import Dog
 from sample_scenes.four_legged import WALK, go_on_four_legs
 from sample_scenes.keys import write_action
-from softground_addon.blender import setting_paths, tread_images
+from softground_addon.blender import tread_images
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.playback import own_data
+from softground_addon.blender.properties import setting_paths
 from softground_addon.core.composers.relief_plan import asked_of
 from softground_addon.core.errors import InputError
 from tests.blender import shots

@@ -15,8 +15,8 @@ from softground_addon.blender import ground_presets, jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import prop_setup
 from softground_addon.blender.ground import ground_mesh
-from softground_addon.blender.operators import shot_setup as operators
 from softground_addon.blender.playback import own_data
+from softground_addon.blender.setup import shot_setup as operators
 from softground_addon.core.ground import presets
 from softground_addon.core.motion.sole_motion import COARSER
 from softground_addon.core.record import record

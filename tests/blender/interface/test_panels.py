@@ -17,7 +17,7 @@ import pytest
 from release import strings
 from softground_addon.blender import ground_presets, jobs, registration, session, settings, translation
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.operators import bake_result, modal_bake, prediction, shot_setup
+from softground_addon.blender.operators import bake_result, modal_bake, prediction
 from softground_addon.blender.panels import (
     ground_options_panel,
     panels,
@@ -28,6 +28,7 @@ from softground_addon.blender.panels import (
     weather_panel,
 )
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.setup import shot_setup
 from softground_addon.blender.state import state
 from softground_addon.core.ground import presets
 from softground_addon.core.loads.cell_limits import Coverage, Fineness

@@ -585,7 +585,7 @@ def test_esc_as_prints_are_kept_leaves_live_mode_on(coarse_shot):
     coarse_shot.frame_set(30)
     shown, before = display_heights(coarse_shot), fingerprints.of_file()
     for most in (1, 40, 80, 120):
-        assert steps_taken(state.live.keeping(coarse_shot), most) == most
+        assert steps_taken(state.live.keeping(), most) == most
         assert fingerprints.of_file() == before
     coarse_shot.frame_set(48)
     assert live.is_on()

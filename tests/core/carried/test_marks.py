@@ -16,7 +16,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.surfaces import LIQUIDS
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.loads.estimate import estimate_loads
-from softground_addon.core.record.record import steps_of
+from softground_addon.core.record.record import BakeRecord
 from softground_addon.core.weather import weather
 from tests.core.ground.test_hard_ground import SNOW, lifted, slab, standing_on
 from tests.core.prop_bodies import rolling
@@ -39,7 +39,7 @@ def crossing(steps=12, onto=2.5, ends=9.0):
 def marks(surface="mud", muted=(), wet=None, **options):
     loads, footprints, terrain = crossing()
     terrain = replace(terrain, wet=wet or {})
-    steps = steps_of(footprints, {}, {}, {})
+    steps = BakeRecord(footprints, {}).steps
     steps = [replace(step, footprint=None) if step.index in muted else step for step in steps]
     return marks_of([loads], steps, terrain, surface=surface, **options)
 
@@ -195,7 +195,7 @@ def test_a_body_that_slides_on_smears_and_one_that_rests_leaves_its_underside():
 def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
     loads, footprints, terrain = crossing()
     assert marks("sand") is None
-    assert marks_of([loads], steps_of(footprints, {}, {}, {}), terrain.ground, surface="mud") is None
+    assert marks_of([loads], BakeRecord(footprints, {}).steps, terrain.ground, surface="mud") is None
 
 
 def test_dirty_soles_leave_marks_though_they_step_into_nothing():
@@ -241,7 +241,7 @@ def test_of_mud_and_a_puddle_what_is_most_is_left():
 
 def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
     _, footprints, _ = crossing()
-    steps = steps_of(footprints, {}, {}, {})
+    steps = BakeRecord(footprints, {}).steps
     whole = marks()
     for muted in ((0,), (0, 1, 2), range(len(steps)), ()):
         edited = [replace(step, footprint=None) if step.index in muted else step for step in steps]
@@ -256,7 +256,7 @@ def test_edited_steps_change_what_marks_weigh_as_if_they_were_laid_anew():
 def test_a_step_that_is_shifted_before_earlier_contacts_with_the_floor_leaves_marks_there():
     loads, footprints, terrain = crossing()
     late = [replace(step, end_frame=step.end_frame + 500, start_frame=step.start_frame + 500) for step in footprints]
-    steps = steps_of(late, {}, {}, {})
+    steps = BakeRecord(late, {}).steps
     found = marks_of([loads], steps, terrain, surface="mud")
     assert not found.mass.any()
     early = [replace(step, footprint=before) for step, before in zip(steps, footprints, strict=True)]
@@ -268,7 +268,7 @@ def test_a_step_that_is_shifted_before_earlier_contacts_with_the_floor_leaves_ma
 def test_events_on_a_floor_know_what_soles_bring_less_with_each_step_and_none_if_steps_are_muted():
     loads, footprints, _ = crossing()
     table = events([loads], footprints, surface="mud", first_frame=1.0)
-    steps, found = steps_of(footprints, {}, {}, {}), marks()
+    steps, found = BakeRecord(footprints, {}).steps, marks()
     rows = found.floors.with_films(table, steps)
     hard = [row for row in rows if row["surface"] == "hard" and row["phase"] == "heel_strike"]
     assert len(hard) > 3
@@ -290,13 +290,13 @@ def test_more_may_stick_and_it_may_go_farther():
     found = marks(carried=(2.0, 3.0))
     carried = found.carried
     assert carried.picked_up == pytest.approx(carried.left_behind + carried.on_soles, abs=1e-9)
-    assert found.with_steps(steps_of(crossing()[1], {}, {}, {}), {}).mass == pytest.approx(found.mass)
+    assert found.with_steps(BakeRecord(crossing()[1], {}).steps, {}).mass == pytest.approx(found.mass)
 
 
 @pytest.mark.parametrize("ground", ["sand", "snow"])
 def test_marks_of_a_region_come_back_when_its_steps_are_muted_no_more(ground):
     loads, footprints, terrain = crossing()
-    steps = steps_of([replace(step, surface="mud") for step in footprints], {}, {}, {})
+    steps = BakeRecord([replace(step, surface="mud") for step in footprints], {}).steps
     muted = [replace(step, footprint=None) for step in steps]
     laid_marks = marks_of([loads], muted, terrain, surface=ground)
     assert not laid_marks.mass.any()

@@ -16,7 +16,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record import record
-from softground_addon.core.record.contact_steps import LENGTH
+from softground_addon.core.record.contact_steps import LENGTH, width_of
 from softground_addon.core.record.edits import StepEdit, from_json, step_id, to_json, without_sole
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.mesh_sole import MeshSole
@@ -348,7 +348,7 @@ def test_a_forged_print_whose_sole_is_thrown_far_away_is_refused_in_no_time(row)
     """Steps are kept as second differences: a single forged number moves all that come later, some metres in each."""
     _, bake = baked()
     steps = bake.footprints[1].pressed_by
-    coded = steps.coded.reshape(-1, steps.width).copy()
+    coded = steps.coded.reshape(-1, width_of(steps.pressing)).copy()
     coded[row, :2] += round(30.0 / LENGTH / (len(coded) - row % len(coded)))
     forged = replace(bake.footprints[1], pressed_by=replace(steps, coded=coded.reshape(-1)))
     started = time.process_time()

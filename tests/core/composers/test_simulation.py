@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.simulation import Simulation, simulate
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
@@ -411,7 +411,7 @@ def test_a_simulation_goes_on_from_a_recomposed_ground():
     ground, footprints = pressed(first, MUD)
     recomposed = recompose(footprints)
     for state in (ground, recomposed):
-        for _ in Simulation(SoftGround(FlatTerrain(), MUD), state).run([second]):
+        for _ in simulate([second], SoftGround(FlatTerrain(), MUD), state.cell_size, pressed=state):
             pass
     for window in ground.tile_windows():
         assert np.abs(ground.read(window) - recomposed.read(window)).max() < 1e-8

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from softground_addon.core.debris import debris, step_throws
-from softground_addon.core.ground import crumbs
 from softground_addon.core.ground.surfaces import SURFACES
+from softground_addon.core.meshing import crumbs
 from softground_addon.core.record.record import BakeRecord, dump, load
 from softground_addon.core.relief import amounts
 from softground_addon.core.relief.layers import Around

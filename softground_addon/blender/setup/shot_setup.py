@@ -21,13 +21,13 @@ from ..baking import scene_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
-from ..operator_base import OnGround, reports_errors
+from ..operator_base import Act, OnGround
+from ..operators.modal_job import Reading, Reports
+from ..operators.panel_base import active_character
 from ..reading import analysis, shots
 from ..rigs import frame_ranges, rig_mapping
 from ..sampling import body_sampling, rig_checks, skin_sampling
 from ..translation import translated
-from .character_editing import active_character
-from .modal_job import Reading, Reports
 
 
 class SOFTGROUND_OT_add_character(Reading):
@@ -119,12 +119,10 @@ class SOFTGROUND_OT_use_as_ground(Reading):
     cancelled = "Use Selected cancelled: nothing was changed"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a mesh is selected that may be the ground."""
-        if not super().poll(context):
-            return False
-        cls.poll_message_set(translated("Select the mesh to walk on, not a character"))
-        return selected_ground(context) is not None or _selected_instance(context) is not None
+    def missing(cls, context: bpy.types.Context) -> str:
+        if not (selected_ground(context) or _selected_instance(context)):
+            return "Select the mesh to walk on, not a character"
+        return super().missing(context)
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         _check_no_instance(bpy.context)
@@ -222,12 +220,11 @@ def selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     return None if belongs else trail_detail.ground_of(obj)
 
 
-class SOFTGROUND_OT_open_settings(bpy.types.Operator):
+class SOFTGROUND_OT_open_settings(Act):
     """Select what has these settings, and show them in Properties > Physics"""
 
     bl_idname = "softground.open_settings"
     bl_label = "Open Settings"
-    bl_options = {"REGISTER", "UNDO"}
 
     of: EnumProperty(
         name="Of",
@@ -238,13 +235,10 @@ class SOFTGROUND_OT_open_settings(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if objects can be selected."""
-        cls.poll_message_set(translated("Switch to Object Mode first"))
-        return context.mode == "OBJECT"
+    def missing(cls, context: bpy.types.Context) -> str:
+        return "" if context.mode == "OBJECT" else "Switch to Object Mode first"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         options = settings.options_of(context)
         character, shown = active_character(options), None
         if self.of == "GROUND" and settings.exists(options.ground):
@@ -259,10 +253,9 @@ class SOFTGROUND_OT_open_settings(bpy.types.Operator):
             raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
         created_ground.select(settings.scene_of(context), shown)
         if not context.screen or not show_physics(context.screen.areas):
-            self.report({"INFO"}, translated("Its settings are in Properties > Physics"))
+            self.say("Its settings are in Properties > Physics")
             if context.screen and not bpy.app.background:
                 bpy.app.timers.register(partial(_show_physics_of, context.screen.name), first_interval=ONCE_DRAWN)
-        return {"FINISHED"}
 
 
 ONCE_DRAWN = 0.2
@@ -289,15 +282,13 @@ def _show_physics_of(name: str) -> None:
         show_physics(screen.areas)
 
 
-class SOFTGROUND_OT_apply_look(OnGround, bpy.types.Operator):
+class SOFTGROUND_OT_apply_look(OnGround, Act):
     """Show the preset's look in the prints, over copies of your own materials. Clear Bake removes it"""
 
     bl_idname = "softground.apply_look"
     bl_label = "Apply Look"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         options = scene.softground
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
@@ -307,11 +298,10 @@ class SOFTGROUND_OT_apply_look(OnGround, bpy.types.Operator):
         text = "'{ground}' now looks like {look}"
         if mixed:
             text = "'{ground}' now looks like {look}, over {count} of your materials"
-        self.report({"INFO"}, translated(text, ground=options.ground.name, look=shown, count=mixed))
-        return {"FINISHED"}
+        self.say(text, ground=options.ground.name, look=shown, count=mixed)
 
 
-class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
+class SOFTGROUND_OT_copy_bake_command(Act):
     """Copy a command line that bakes the saved file into a new file beside it, for a terminal or a farm"""
 
     bl_idname = "softground.copy_bake_command"
@@ -319,21 +309,15 @@ class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """True if the file on disk is the one that is open."""
+    def missing(cls, _context: bpy.types.Context) -> str:
         if not bpy.data.filepath:
-            cls.poll_message_set(translated("Save the file first: the command bakes it from there"))
-            return False
-        if bpy.data.is_dirty and not bpy.app.background:  # in background it always is
-            cls.poll_message_set(translated("Save your changes first: the command bakes the file as it is saved"))
-            return False
-        return True
+            return "Save the file first: the command bakes it from there"
+        is_changed = bpy.data.is_dirty and not bpy.app.background  # in background it always is
+        return "Save your changes first: the command bakes the file as it is saved" if is_changed else ""
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         context.window_manager.clipboard = bake_command(settings.scene_of(context))
         self.report({"INFO"}, "Copied the command that bakes this shot")
-        return {"FINISHED"}
 
 
 def bake_command(scene: bpy.types.Scene) -> str:

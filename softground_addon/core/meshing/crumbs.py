@@ -15,8 +15,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground import surfaces
 from ..numerics.arrays import Array
-from . import surfaces
 
 SIZE_FALL = 2.5
 """Exponent with which the number of crumbs falls over their diameter, n(d) ~ d^-2.5: by eye."""

@@ -11,8 +11,8 @@ import bpy
 from mathutils import Vector
 
 from .. import compat, settings
-from ..translation import translated
-from . import show_prints
+from ..operator_base import Act
+from ..operators import show_prints
 
 FILE = Path(__file__).with_name("sample_walk.json")
 """Bones, mesh and keys of the figure in plain numbers; `sample_scenes.sample_walk` writes it."""
@@ -149,29 +149,23 @@ def _link(armature: bpy.types.Object, data: Any) -> bpy.types.Object:
     return obj
 
 
-class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
+class SOFTGROUND_OT_add_sample_scene(Act):
     """Add a walking figure to try SoftGround with, a sun and a camera, beside what is there. The camera becomes the
     scene's if it has none or the file was never saved; the rest stays as it is"""
 
     bl_idname = "softground.add_sample_scene"
     bl_label = "Add Sample Scene"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if an object can be added."""
-        cls.poll_message_set(translated("Leave Edit Mode first"))
-        return context.mode == "OBJECT"
+    def missing(cls, context: bpy.types.Context) -> str:
+        return "" if context.mode == "OBJECT" else "Leave Edit Mode first"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         armature = add_walking_figure(context)
         add_light_and_camera(context, armature)
         if show_prints.is_free(context.area):
             show_prints.turn(context.area, armature.location + FIRST_STEPS, LOOK, FAR)
-        self.report(
-            {"INFO"}, translated("Added '{name}': press Add Character, then Bake Footprints", name=armature.name)
-        )
-        return {"FINISHED"}
+        self.say("Added '{name}': press Add Character, then Bake Footprints", name=armature.name)
 
 
 CLASSES = (SOFTGROUND_OT_add_sample_scene,)

@@ -11,24 +11,22 @@ from ...core.meshing import cover as covers
 from .. import further_grounds, mesh_arrays, settings
 from ..drafts import none_left_if_it_fails
 from ..ground import created_ground, ground_checks, ground_surface
-from ..operator_base import reports_errors
+from ..operator_base import Act
 from ..placement import to_world, units_about
 from ..properties import SoftGroundPainted
 from ..reading import analysis
 from ..remedies import said
-from ..translation import translated
 from . import shot_setup
 
 SPACING = 0.04
 """Largest distance of a cover's vertices [m]; the trail is refined as on any coarse ground."""
 
 
-class SOFTGROUND_OT_cover(bpy.types.Operator):
+class SOFTGROUND_OT_cover(Act):
     """Lay a ground of this thickness on the selected mesh: on its faces that look up, with rounded edges"""
 
     bl_idname = "softground.cover"
     bl_label = "Cover"
-    bl_options = {"REGISTER", "UNDO"}
 
     thickness_cm: FloatProperty(
         name="Thickness (cm)",
@@ -41,13 +39,11 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a mesh is selected that may be covered."""
-        cls.poll_message_set(translated("Select the mesh to cover, in Object Mode"))
-        return context.mode == "OBJECT" and shot_setup.selected_ground(context) is not None
+    def missing(cls, context: bpy.types.Context) -> str:
+        is_selected = context.mode == "OBJECT" and shot_setup.selected_ground(context) is not None
+        return "" if is_selected else "Select the mesh to cover, in Object Mode"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene, obj = settings.scene_of(context), shot_setup.selected_ground(context)
         assert obj is not None
         if fault := ground_checks.hard_fault(obj):
@@ -79,8 +75,7 @@ class SOFTGROUND_OT_cover(bpy.types.Operator):
             options.hard_grounds.add().object = obj
             options.active_hard_ground = len(options.hard_grounds) - 1
         created_ground.select(scene, ground)
-        self.report({"INFO"}, translated(text, name=ground.name, names=repr(ground.name)))
-        return {"FINISHED"}
+        self.say(text, name=ground.name, names=repr(ground.name))
 
 
 @none_left_if_it_fails()

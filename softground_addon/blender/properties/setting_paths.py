@@ -7,8 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import InputError
-from . import ground_slots
+from ...core.errors import InputError
+from .. import ground_slots
 
 SLOTS = "slots"
 """Begin of a path to the preset of a material slot of the ground, by its number or the name of its material."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,25 +11,15 @@ from bpy.props import StringProperty
 from ...core.errors import InputError
 from .. import jobs, settings
 from ..characters import character_setup, contact_editing, import_fixes
-from ..operator_base import reports_errors
+from ..operator_base import Act, Needs
+from ..operators.modal_job import Reading, Reports
+from ..operators.panel_base import RemovesChosen, active_character
 from ..reading import analysis
 from ..rigs import frame_ranges
 from ..translation import translated
-from .modal_job import Reading, Reports
-from .panel_base import RemovesChosen, chosen_of
 
 
-def active_character(options: Any) -> Any:
-    """The character that is chosen in the list, or None."""
-    return chosen_of(options, "characters", "active_character")
-
-
-def active_sole(options: Any) -> Any:
-    """The sole that is chosen in the list of the active character, or None."""
-    return chosen_of(active_character(options), "soles", "active_sole")
-
-
-class _OnCharacter:
+class _OnCharacter(Needs):
     """Operators that need a chosen character."""
 
     character: StringProperty(
@@ -54,12 +44,9 @@ class _OnCharacter:
         raise InputError(f"There is no character '{self.character}': select one in the list.")
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character is chosen."""
-        if active_character(settings.options_of(context)) is None:
-            cast("Any", cls).poll_message_set(translated("Add a character first"))
-            return False
-        return True
+    def missing(cls, context: bpy.types.Context) -> str:
+        is_chosen = active_character(settings.options_of(context)) is not None
+        return super().missing(context) if is_chosen else "Add a character first"
 
 
 class SOFTGROUND_OT_remove_character(RemovesChosen):
@@ -81,51 +68,35 @@ def suggested_mass(character: Any) -> float:
     return likely if differs else 0.0
 
 
-class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
+class SOFTGROUND_OT_mass_by_volume(_OnCharacter, Act):
     """Set the mass from the volume of the character's skin, at the density of water; for figures on two legs that
     would be far too heavy, from their height"""
 
     bl_idname = "softground.mass_by_volume"
     bl_label = "Mass by Volume"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         character = active_character(settings.options_of(context))
         if not character.skin_mass > 0:
             raise InputError(f"'{character_setup.title_of(character)}' has no skin to go by: type its mass.")
         character.mass = import_fixes.mass_of(character)
-        return {"FINISHED"}
 
 
-class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
+class SOFTGROUND_OT_fix_scale(_OnCharacter, Act):
     """Scale a character that was made in other units, by parenting it to a scaled empty. Its own animation does not
     change"""
 
     bl_idname = "softground.fix_scale"
     bl_label = "Fix Import Scale"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         character = self.chosen(scene.softground)
         factor = character_setup.fix_scale(scene, character)
-        name = character_setup.title_of(character)
-        self.report({"INFO"}, translated("'{name}' is scaled by {factor}", name=name, factor=f"{factor:g}"))
-        return {"FINISHED"}
+        self.say("'{name}' is scaled by {factor}", name=character_setup.title_of(character), factor=f"{factor:g}")
 
 
-class _ReadingCharacter(_OnCharacter, Reading):
-    """Base of operators on a character that read its animation."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """True if a character is chosen, and no other job runs."""
-        return super().poll(context) and Reading.poll.__func__(cls, context)
-
-
-class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
+class SOFTGROUND_OT_walk_ahead(_OnCharacter, Reading):
     """Make a character that walks on the spot travel as fast as its feet slide, by parenting it to a moving empty.
     Its own animation does not change. Esc cancels"""
 
@@ -144,7 +115,7 @@ class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
         return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
-class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
+class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
     """Find the character's feet and joints again, from its skin, bone names or rest pose. Esc cancels"""
 
     bl_idname = "softground.detect_bones"
@@ -154,19 +125,17 @@ class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
         return character_setup.detecting_bones(scene, scene.softground.active_character)
 
     def _show(self, result: list[str]) -> None:
-        self.report({"INFO"}, translated("Found {parts}", parts=", ".join(result)))
+        self.say("Found {parts}", parts=", ".join(result))
 
 
-class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
+class SOFTGROUND_OT_add_contact(_OnCharacter, Act):
     """Let the selected bones, objects or vertices of the skin print too: hands, knees, canes, snowshoes. Each
     presses with whichever side faces down"""
 
     bl_idname = "softground.add_contact"
     bl_label = "Add Contact"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         scene = settings.scene_of(context)
         posed = context.object if context.mode == "POSE" else None
         if posed is not None:
@@ -190,26 +159,22 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             )
             character = wearer or active_character(scene.softground)
             added = contact_editing.add_object_contacts(scene.softground, character, props)
-        name = character_setup.title_of(character)
-        self.report({"INFO"}, translated("'{name}' also prints with {parts}", name=name, parts=", ".join(added)))
-        return {"FINISHED"}
+        self.say("'{name}' also prints with {parts}", name=character_setup.title_of(character), parts=", ".join(added))
 
 
-class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
+class SOFTGROUND_OT_add_sole(_OnCharacter, Act):
     """Add a contact, and choose its bone or object below"""
 
     bl_idname = "softground.add_sole"
     bl_label = "Add Empty Contact"
-    bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         character = active_character(settings.options_of(context))
         taken = {sole.name for sole in character.soles}
         sole = character.soles.add()
         number = next(number for number in range(1, len(taken) + 2) if f"sole {number}" not in taken)
         sole.name = f"sole {number}"
         character.active_sole = len(character.soles) - 1
-        return {"FINISHED"}
 
 
 class SOFTGROUND_OT_remove_sole(RemovesChosen):
