@@ -12,6 +12,7 @@ from ..ground.hard_ground import bare
 from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import TILE, SampledGrid, Window
+from ..ground.surfaces import find
 from ..ground.variation import VariationTiles
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.interpolation import cubic
@@ -128,8 +129,10 @@ class CarvedGround:
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
-        self._cells = SampledGrid(self._untouched, cell_size, channels=7 + SAMPLES**2)
-        """Terrain, its openness, the layer's floor, T, loose matter, what is recorded of the cut and of this, and K."""
+        self._site = SampledGrid(self._undisturbed_site, cell_size, channels=3)
+        """Terrain, its openness, the layer's floor."""
+        self._cells = SampledGrid(self._untouched, cell_size, channels=5 + SAMPLES**2)
+        """T, loose matter, what is recorded of the cut and of this, what has broken off, and K."""
         self._tops = SampledGrid(self._terrain, cell_size, channels=1)
         """Highest of the quarters of each cell, with the loose matter on it."""
         self._contacts: list[tuple[Window, Mask]] = []
@@ -138,15 +141,18 @@ class CarvedGround:
         self._settling: dict[CarvedStep, int] = {}
         """Steps whose loose matter comes to rest, and for how many more frames."""
 
-    def _untouched(self, x: Array, y: Array) -> Array:
-        """The channels of a tile, from its cell centres."""
+    def _undisturbed_site(self, x: Array, y: Array) -> Array:
+        """What a tile is before anybody comes, from its cell centres."""
         window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
         surface = self._undisturbed.surface(window)
-        terrain, nothing = np.nan_to_num(surface.heights), np.zeros(x.shape)
-        depth = self._ground.layer_depths(window, self._cell_size)
+        terrain, depth = np.nan_to_num(surface.heights), self._ground.layer_depths(window, self._cell_size)
         bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
-        never = [nothing + np.inf] * SAMPLES**2
-        return np.stack([terrain, surface.bears, bottom, terrain, nothing, nothing, nothing, *never])
+        return np.stack([terrain, surface.bears, bottom])
+
+    def _untouched(self, x: Array, y: Array) -> Array:
+        """The channels of a tile, from its cell centres."""
+        nothing = np.zeros((4, *x.shape))
+        return np.concatenate([self._terrain(x, y), nothing, np.full((SAMPLES**2, *x.shape), np.inf)])
 
     def _terrain(self, x: Array, y: Array) -> Array:
         """Heights of the undisturbed ground of a tile, from its cell centres, (1, rows, columns)."""
@@ -218,7 +224,8 @@ class CarvedGround:
         if (shared := window.intersection(part.window)) is not None:
             underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
-        cells.cut(np.maximum(underside, channels[2]), part.way, walls.packing, _lowest(bodies, window), again=again)
+        underside = np.maximum(underside, self._bottom(window))
+        cells.cut(underside, part.way, walls.packing, _lowest(bodies, window), again=again)
         self._write(step, window, cells, channels, frame)
         before = self._loosened.get(step)
         self._loosened[step] = window if before is None else before.union(window)
@@ -232,6 +239,20 @@ class CarvedGround:
             cells.slide(step.walls, self._held(bodies, window, cells), (window.row, window.column), SWEEPS)
             self._write(step, window, cells, channels, frame)
         self._loosened.clear()
+
+    def _crumbling(self, step: CarvedStep, window: Window) -> Array | float:
+        """Depth to which the edges of a window break off at most, (rows, columns), or of all of them [m]."""
+        regions = self._ground.regions
+        if regions is None:
+            return step.walls.crumbling
+        numbers, shares = regions.under(window, window, self._cell_size)
+        depths = np.array([find(regions.kinds[number].surface).wall_crumbling for number in numbers])
+        return float(depths[0]) if shares is None else np.asarray(np.tensordot(depths, shares, 1))
+
+    def _bottom(self, window: Window) -> Array:
+        """Floor of the layer, (rows, columns) [m]."""
+        floors: Array = self._site.read(window)[2]
+        return floors
 
     @staticmethod
     def _held(bodies: Sequence[Drawn], window: Window, cells: CarvedCells) -> Mask:
@@ -248,19 +269,21 @@ class CarvedGround:
         """Let walls crumble at first, and what is loose slide on around bodies; at the end, all of it is recorded."""
         for step, frames in list(self._settling.items()):
             holds, begins = step.walls.strength > 0, frames == self._frames_to_rest
-            crumbling = step.walls.crumbling if begins else 0.0
+            edge = ceil(2 * EDGE / self._cell_size)
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
+            most = np.max(self._crumbling(step, window.expanded(edge))) if begins else 0.0
             cells, _ = self._read(window)
             surface = cells.surface[~cells.closed]
-            reach = step.walls.reach(surface, cells.loose + crumbling, self._cell_size)
-            window = window.expanded(max(reach, ceil(2 * EDGE / self._cell_size) if crumbling else 0))
+            reach = step.walls.reach(surface, cells.loose + most, self._cell_size)
+            window = window.expanded(max(reach, edge if most else 0))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
-            if crumbling:
-                cells.crumble(pieces(window, self._cell_size, crumbling), held, channels[2])
+            if most:
+                deepest = pieces(window, self._cell_size, self._crumbling(step, window))
+                cells.crumble(deepest, held, self._bottom(window))
             if not holds and begins:
-                cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
+                cells.gather(channels[3] * QUANTUM, THIN)  # then its edges slide as well
             cells.slide(
                 step.walls,
                 held,
@@ -268,7 +291,7 @@ class CarvedGround:
                 ceil(sweeps / self._frames_to_rest),
             )
             if holds and frames == 1:
-                cells.gather(channels[6] * QUANTUM, THIN)
+                cells.gather(channels[3] * QUANTUM, THIN)
             if frames == 1:
                 del self._settling[step]
             else:
@@ -312,10 +335,11 @@ class CarvedGround:
 
     def _read(self, window: Window) -> tuple[CarvedCells, Array]:
         """The cells of a window, and their channels."""
-        channels = self._cells.read(window)
-        terrain, bears, _, pressed, loose = channels[:5]
+        channels, (terrain, bears, _) = self._cells.read(window), self._site.read(window)
+        pressed, loose, _, _, broken = channels[:5]
         contact = self._contact(window)
-        return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[7:], loose), channels
+        cells = CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[5:], loose, broken)
+        return cells, channels
 
     def _write(
         self, step: CarvedStep, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int = LEAST
@@ -323,10 +347,10 @@ class CarvedGround:
         """Write cells back, and record their changes that come to the least [QUANTUM] with a step."""
         standing = cells.standing
         carved = np.stack([cells.pressed - standing, cells.loose])
-        change = quantised(carved) - channels[5:7].astype(np.int64)
+        change = quantised(carved) - channels[2:4].astype(np.int64)
         change *= (np.abs(change) >= least).any(axis=0)
-        channels[3], channels[4], channels[7:] = cells.pressed, cells.loose, cells.lowest
-        channels[5:7] += change
+        channels[2:4] += change
+        channels[0], channels[1], channels[4], channels[5:] = cells.pressed, cells.loose, cells.broken, cells.lowest
         self._cells.write(window, channels)
         self._tops.write(window, np.minimum(cells.pressed, cells.lowest.max(axis=0, keepdims=True)) + cells.loose)
         step.at_rest = least == 1

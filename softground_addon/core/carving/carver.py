@@ -13,7 +13,7 @@ Terzaghi 1943, "Theoretical Soil Mechanics", doi:10.1002/9780470172766: the heig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import ceil, pi, tan
 
@@ -115,6 +115,8 @@ class CarvedCells:
         Lowest underside K so far in the quarters of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
         Height of the loose matter [m].
+    broken : (rows, columns) float array
+        Height that has broken off the edges of walls [m].
     cut_height, packed, unplaced : float
         Sums of the heights that were cut of what stood, fell or rose as a rim, packed, and found no place around [m].
     """
@@ -126,6 +128,7 @@ class CarvedCells:
     pressed: Array
     lowest: Array
     loose: Array
+    broken: Array = field(default_factory=lambda: np.zeros(()))
     cut_height: float = 0.0
     packed: float = 0.0
     unplaced: float = 0.0
@@ -225,7 +228,7 @@ class CarvedCells:
     def crumble(self, deepest: Array, body: Mask, floor: Array | None = None) -> None:
         """Let the edges of walls to cut or pressed ground break off: what breaks lies loose where it stood.
 
-        Asked to again, a wall recedes hardly any further: a place breaks off to its depth below what it was.
+        Asked to again, a wall recedes hardly any further: a place breaks off to its depth, all in all.
 
         Parameters
         ----------
@@ -242,8 +245,7 @@ class CarvedCells:
         reach = [ceil(part * EDGE / self.cell_size) for part in (1 / 3, 2 / 3, 1)]
         drops = [-depth - lowest_within(surface, cells) for cells in reach]  # a hillside is no wall
         near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
-        before = np.maximum(np.minimum(self.pressed, self.terrain) - standing, 0.0)
-        broken = np.minimum(deepest * near - before, MOST_OF_DROP * drops[-1])
+        broken = np.minimum(deepest * near - self.broken, MOST_OF_DROP * drops[-1])
         if floor is not None:
             broken = np.minimum(broken, standing - floor)
         breaks = (broken > 0) & ~(self.closed | self.contact | body)
@@ -251,6 +253,7 @@ class CarvedCells:
         fallen = standing - self.standing
         self.cut_height += float(fallen.sum())
         self.loose += fallen
+        self.broken = self.broken + fallen
 
     def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
         """Let slide what is too steep; a body that stands in the ground holds it.
@@ -289,11 +292,14 @@ def least_cut(contact: Mask, cell_size: float) -> Array:
     return np.where(contact, min(UNDER_SOLE, cell_size), TOLERANCE)
 
 
-def pieces(window: Window, cell_size: float, crumbling: float) -> Array:
-    """Depth to which each cell of a window may break off, (rows, columns) [m], in pieces of all `PIECES`."""
+def pieces(window: Window, cell_size: float, crumbling: float | Array) -> Array:
+    """Depth to which each cell of a window may break off, (rows, columns) [m], in pieces of all `PIECES`.
+
+    Of all cells at most the same `crumbling`, or each its own (rows, columns) [m].
+    """
     x, y = (axis.ravel() for axis in np.meshgrid(*window.centres(cell_size)))
     above = sum((noise(SEED + number, size, x, y) for number, size in enumerate(PIECES)), np.zeros(len(x)))
-    return np.asarray(crumbling * np.maximum(above, 0.0)).reshape(window.rows, window.columns)
+    return np.asarray(crumbling * np.maximum(above, 0.0).reshape(window.rows, window.columns))
 
 
 def _middle(quarters: Array) -> Array:
