@@ -143,7 +143,7 @@ class CarvedGround:
 
     def _undisturbed_site(self, x: Array, y: Array) -> Array:
         """What a tile is before anybody comes, from its cell centres."""
-        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
+        window = self._tile_at(x, y)
         surface = self._undisturbed.surface(window)
         terrain, depth = np.nan_to_num(surface.heights), self._ground.layer_depths(window, self._cell_size)
         bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
@@ -151,13 +151,17 @@ class CarvedGround:
 
     def _untouched(self, x: Array, y: Array) -> Array:
         """The channels of a tile, from its cell centres."""
-        nothing = np.zeros((4, *x.shape))
-        return np.concatenate([self._terrain(x, y), nothing, np.full((SAMPLES**2, *x.shape), np.inf)])
+        channels = np.zeros((5 + SAMPLES**2, *x.shape))
+        channels[:1], channels[5:] = self._terrain(x, y), np.inf
+        return channels
 
     def _terrain(self, x: Array, y: Array) -> Array:
         """Heights of the undisturbed ground of a tile, from its cell centres, (1, rows, columns)."""
-        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
-        return np.nan_to_num(self._undisturbed.heights(window))[None]
+        return self._site.read(self._tile_at(x, y))[:1]
+
+    def _tile_at(self, x: Array, y: Array) -> Window:
+        """The cells of a tile, from their centres."""
+        return Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
 
     def press(self, since: float, frame: float) -> None:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
@@ -274,9 +278,9 @@ class CarvedGround:
             window = step.recorder.window
             most = np.max(self._crumbling(step, window.expanded(edge))) if begins else 0.0
             cells, _ = self._read(window)
-            surface = cells.surface[~cells.closed]
-            reach = step.walls.reach(surface, cells.loose + most, self._cell_size)
-            window = window.expanded(max(reach, edge if most else 0))
+            changed = np.where(cells.closed, 0.0, cells.surface - cells.terrain)
+            reach = step.walls.reach(changed, cells.loose + most, self._cell_size)
+            window = window.expanded(max(reach, edge if most else 0, self._margin))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
             if most:

@@ -89,10 +89,18 @@ class Walls:
         strength = cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0
         return cls(surface.wall_packing, strength, repose, surface.wall_crumbling)
 
-    def reach(self, surface: Array, loose: Array, cell_size: float) -> int:
-        """Number of cells around a window that what slides may spread over, from its heights (rows, columns) [m]."""
-        drop = min(np.ptp(surface), loose.max() + max(np.ptp(surface) - self.strength, 0.0))
-        return ceil(drop / (tan(self.repose) * cell_size)) + 1
+    def reach(self, change: Array, loose: Array, cell_size: float) -> int:
+        """Number of cells around a window that what slides may spread over.
+
+        Parameters
+        ----------
+        change, loose : (rows, columns) float arrays
+            Height over the undisturbed ground, and that of what is loose [m].
+        """
+        rows, columns = (np.minimum(np.arange(count), np.arange(count)[::-1]) for count in change.shape)
+        falls = loose + np.maximum(np.ptp(change) - self.strength, 0.0)
+        spread = np.minimum(falls, np.ptp(change)) / (tan(self.repose) * cell_size)
+        return max(ceil((spread - np.minimum(rows[:, None], columns)).max()), 0) + 1
 
 
 @dataclass
