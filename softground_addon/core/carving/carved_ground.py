@@ -33,6 +33,9 @@ SETTLING, SWEEPS_TO_SETTLE = 1 / 8, 96
 without cohesion, in as many as it takes."""
 LEAST = round(3e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 3 mm."""
+TOP, PLOUGHS_FROM, FRONT = 0.1, 1.0, 4
+"""What is cut within so much of the open ground [m] may fly, as what cuts it goes so fast [m/s], from so many places
+along its front."""
 THIN = 2e-3
 """Loose matter that comes to rest is gathered where it is thinner [m]."""
 
@@ -124,7 +127,7 @@ class CarvedGround:
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
         self._slides_every, self._frames_to_rest = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
-        self._frames_to_push = PUSHED * rate
+        self._frames_to_push, self._rate = PUSHED * rate, rate
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
@@ -228,11 +231,27 @@ class CarvedGround:
         if (shared := window.intersection(part.window)) is not None:
             underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
-        underside = np.maximum(underside, self._bottom(window))
+        underside, standing = np.maximum(underside, self._bottom(window)), cells.standing
         cells.cut(underside, part.way, walls.packing, _lowest(bodies, window), again=again)
+        flies = (1.0 - walls.packing) * (standing - np.maximum(cells.standing, cells.terrain - TOP))
+        self._plough(part, window, np.maximum(flies, 0.0), standing, frame)
         self._write(step, window, cells, channels, frame)
         before = self._loosened.get(step)
         self._loosened[step] = window if before is None else before.union(window)
+
+    def _plough(self, part: Drawn, window: Window, depth: Array, standing: Array, frame: float) -> None:
+        """Note what may fly of what was cut of what stood (rows, columns), if what cut it is fast [m]."""
+        velocity = np.append(part.way * self._rate, 0.0)
+        holds = part.step.walls.strength > 0  # what has filled a funnel again stays
+        if not holds or np.hypot(*velocity[:2]) < PLOUGHS_FROM or not depth.any():
+            return
+        row, column = np.nonzero(depth)
+        x, y = (centres[cells] for centres, cells in zip(window.centres(self._cell_size), (column, row), strict=True))
+        ahead = np.argsort(x * part.way[0] + y * part.way[1])
+        front = ahead[np.linspace(len(ahead) // 2, len(ahead) - 1, FRONT).astype(int)]
+        top = np.full(FRONT, standing[row, column].mean())
+        points = np.stack([x[front], y[front], top], axis=-1)
+        part.step.plough(frame, float(depth.sum()) * self._cell_size**2, points, velocity)
 
     def slide(self, bodies: Sequence[Drawn], frame: float) -> None:
         """Let slide what was loosened since it slid before, once it is time to."""
