@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -76,7 +76,7 @@ def with_debris(
 ) -> Slices[tuple[BakeRecord, Debris | None]]:
     """A record with the debris of its steps booked, if asked for; see `core.debris.thrown_debris.thrown`."""
     if loads is not None and not made_with.debris:
-        return record, None
+        return replace(record, throws=()), None
     throwing = thrown.slices(
         record,
         ground,

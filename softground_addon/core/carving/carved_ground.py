@@ -12,6 +12,7 @@ from ..ground.hard_ground import bare
 from ..ground.heightfield import TerrainTiles
 from ..ground.soft_ground import SoftGround
 from ..ground.sparse_grid import TILE, SampledGrid, Window
+from ..ground.surfaces import find
 from ..ground.variation import VariationTiles
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.interpolation import cubic
@@ -32,6 +33,9 @@ SETTLING, SWEEPS_TO_SETTLE = 1 / 8, 96
 without cohesion, in as many as it takes."""
 LEAST = round(3e-3 / QUANTUM)
 """Changes of a cell are recorded once they come to so much, and all of them at the end [QUANTUM]: 3 mm."""
+TOP, PLOUGHS_FROM, FRONT = 0.1, 1.0, 4
+"""What is cut within so much of the open ground [m] may fly, as what cuts it goes so fast [m/s], from so many places
+along its front."""
 THIN = 2e-3
 """Loose matter that comes to rest is gathered where it is thinner [m]."""
 
@@ -123,13 +127,15 @@ class CarvedGround:
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
         self._slides_every, self._frames_to_rest = (max(1, round(time * rate)) for time in (SLIDES_EVERY, SETTLING))
-        self._frames_to_push = PUSHED * rate
+        self._frames_to_push, self._rate = PUSHED * rate, rate
         self._undisturbed = TerrainTiles(bare(ground.terrain), cell_size)
         self._margin = ceil(2 * REACH / cell_size) + 2
         """Cells around a body that what it cuts is laid on."""
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
-        self._cells = SampledGrid(self._untouched, cell_size, channels=7 + SAMPLES**2)
-        """Terrain, its openness, the layer's floor, T, loose matter, what is recorded of the cut and of this, and K."""
+        self._site = SampledGrid(self._undisturbed_site, cell_size, channels=3)
+        """Terrain, its openness, the layer's floor."""
+        self._cells = SampledGrid(self._untouched, cell_size, channels=5 + SAMPLES**2)
+        """T, loose matter, what is recorded of the cut and of this, what has broken off, and K."""
         self._tops = SampledGrid(self._terrain, cell_size, channels=1)
         """Highest of the quarters of each cell, with the loose matter on it."""
         self._contacts: list[tuple[Window, Mask]] = []
@@ -138,20 +144,27 @@ class CarvedGround:
         self._settling: dict[CarvedStep, int] = {}
         """Steps whose loose matter comes to rest, and for how many more frames."""
 
+    def _undisturbed_site(self, x: Array, y: Array) -> Array:
+        """What a tile is before anybody comes, from its cell centres."""
+        window = self._tile_at(x, y)
+        surface = self._undisturbed.surface(window)
+        terrain, depth = np.nan_to_num(surface.heights), self._ground.layer_depths(window, self._cell_size)
+        bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
+        return np.stack([terrain, surface.bears, bottom])
+
     def _untouched(self, x: Array, y: Array) -> Array:
         """The channels of a tile, from its cell centres."""
-        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
-        surface = self._undisturbed.surface(window)
-        terrain, nothing = np.nan_to_num(surface.heights), np.zeros(x.shape)
-        depth = self._ground.layer_depths(window, self._cell_size)
-        bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
-        never = [nothing + np.inf] * SAMPLES**2
-        return np.stack([terrain, surface.bears, bottom, terrain, nothing, nothing, nothing, *never])
+        channels = np.zeros((5 + SAMPLES**2, *x.shape))
+        channels[:1], channels[5:] = self._terrain(x, y), np.inf
+        return channels
 
     def _terrain(self, x: Array, y: Array) -> Array:
         """Heights of the undisturbed ground of a tile, from its cell centres, (1, rows, columns)."""
-        window = Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
-        return np.nan_to_num(self._undisturbed.heights(window))[None]
+        return self._site.read(self._tile_at(x, y))[:1]
+
+    def _tile_at(self, x: Array, y: Array) -> Window:
+        """The cells of a tile, from their centres."""
+        return Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
 
     def press(self, since: float, frame: float) -> None:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
@@ -218,10 +231,27 @@ class CarvedGround:
         if (shared := window.intersection(part.window)) is not None:
             underside[:, *window.slices(shared)] = part.underside[:, *part.window.slices(shared)]
         again = 1.0 - (1.0 - walls.packing) ** (1.0 / self._frames_to_push)
-        cells.cut(np.maximum(underside, channels[2]), part.way, walls.packing, _lowest(bodies, window), again=again)
+        underside, standing = np.maximum(underside, self._bottom(window)), cells.standing
+        cells.cut(underside, part.way, walls.packing, _lowest(bodies, window), again=again)
+        flies = (1.0 - walls.packing) * (standing - np.maximum(cells.standing, cells.terrain - TOP))
+        self._plough(part, window, np.maximum(flies, 0.0), standing, frame)
         self._write(step, window, cells, channels, frame)
         before = self._loosened.get(step)
         self._loosened[step] = window if before is None else before.union(window)
+
+    def _plough(self, part: Drawn, window: Window, depth: Array, standing: Array, frame: float) -> None:
+        """Note what may fly of what was cut of what stood (rows, columns), if what cut it is fast [m]."""
+        velocity = np.append(part.way * self._rate, 0.0)
+        holds = part.step.walls.strength > 0  # what has filled a funnel again stays
+        if not holds or np.hypot(*velocity[:2]) < PLOUGHS_FROM or not depth.any():
+            return
+        row, column = np.nonzero(depth)
+        x, y = (centres[cells] for centres, cells in zip(window.centres(self._cell_size), (column, row), strict=True))
+        ahead = np.argsort(x * part.way[0] + y * part.way[1])
+        front = ahead[np.linspace(len(ahead) // 2, len(ahead) - 1, FRONT).astype(int)]
+        top = np.full(FRONT, standing[row, column].mean())
+        points = np.stack([x[front], y[front], top], axis=-1)
+        part.step.plough(frame, float(depth.sum()) * self._cell_size**2, points, velocity)
 
     def slide(self, bodies: Sequence[Drawn], frame: float) -> None:
         """Let slide what was loosened since it slid before, once it is time to."""
@@ -232,6 +262,20 @@ class CarvedGround:
             cells.slide(step.walls, self._held(bodies, window, cells), (window.row, window.column), SWEEPS)
             self._write(step, window, cells, channels, frame)
         self._loosened.clear()
+
+    def _crumbling(self, step: CarvedStep, window: Window) -> Array | float:
+        """Depth to which the edges of a window break off at most, (rows, columns), or of all of them [m]."""
+        regions = self._ground.regions
+        if regions is None:
+            return step.walls.crumbling
+        numbers, shares = regions.under(window, window, self._cell_size)
+        depths = np.array([find(regions.kinds[number].surface).wall_crumbling for number in numbers])
+        return float(depths[0]) if shares is None else np.asarray(np.tensordot(depths, shares, 1))
+
+    def _bottom(self, window: Window) -> Array:
+        """Floor of the layer, (rows, columns) [m]."""
+        floors: Array = self._site.read(window)[2]
+        return floors
 
     @staticmethod
     def _held(bodies: Sequence[Drawn], window: Window, cells: CarvedCells) -> Mask:
@@ -248,19 +292,21 @@ class CarvedGround:
         """Let walls crumble at first, and what is loose slide on around bodies; at the end, all of it is recorded."""
         for step, frames in list(self._settling.items()):
             holds, begins = step.walls.strength > 0, frames == self._frames_to_rest
-            crumbling = step.walls.crumbling if begins else 0.0
+            edge = ceil(2 * EDGE / self._cell_size)
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = step.recorder.window
+            most = np.max(self._crumbling(step, window.expanded(edge))) if begins else 0.0
             cells, _ = self._read(window)
-            surface = cells.surface[~cells.closed]
-            reach = step.walls.reach(surface, cells.loose + crumbling, self._cell_size)
-            window = window.expanded(max(reach, ceil(2 * EDGE / self._cell_size) if crumbling else 0))
+            changed = np.where(cells.closed, 0.0, cells.surface - cells.terrain)
+            reach = step.walls.reach(changed, cells.loose + most, self._cell_size)
+            window = window.expanded(max(reach, edge if most else 0, self._margin))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
-            if crumbling:
-                cells.crumble(pieces(window, self._cell_size, crumbling), held, channels[2])
+            if most:
+                deepest = pieces(window, self._cell_size, self._crumbling(step, window))
+                cells.crumble(deepest, held, self._bottom(window))
             if not holds and begins:
-                cells.gather(channels[6] * QUANTUM, THIN)  # then its edges slide as well
+                cells.gather(channels[3] * QUANTUM, THIN)  # then its edges slide as well
             cells.slide(
                 step.walls,
                 held,
@@ -268,7 +314,7 @@ class CarvedGround:
                 ceil(sweeps / self._frames_to_rest),
             )
             if holds and frames == 1:
-                cells.gather(channels[6] * QUANTUM, THIN)
+                cells.gather(channels[3] * QUANTUM, THIN)
             if frames == 1:
                 del self._settling[step]
             else:
@@ -312,10 +358,11 @@ class CarvedGround:
 
     def _read(self, window: Window) -> tuple[CarvedCells, Array]:
         """The cells of a window, and their channels."""
-        channels = self._cells.read(window)
-        terrain, bears, _, pressed, loose = channels[:5]
+        channels, (terrain, bears, _) = self._cells.read(window), self._site.read(window)
+        pressed, loose, _, _, broken = channels[:5]
         contact = self._contact(window)
-        return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[7:], loose), channels
+        cells = CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[5:], loose, broken)
+        return cells, channels
 
     def _write(
         self, step: CarvedStep, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int = LEAST
@@ -323,10 +370,10 @@ class CarvedGround:
         """Write cells back, and record their changes that come to the least [QUANTUM] with a step."""
         standing = cells.standing
         carved = np.stack([cells.pressed - standing, cells.loose])
-        change = quantised(carved) - channels[5:7].astype(np.int64)
+        change = quantised(carved) - channels[2:4].astype(np.int64)
         change *= (np.abs(change) >= least).any(axis=0)
-        channels[3], channels[4], channels[7:] = cells.pressed, cells.loose, cells.lowest
-        channels[5:7] += change
+        channels[2:4] += change
+        channels[0], channels[1], channels[4], channels[5:] = cells.pressed, cells.loose, cells.broken, cells.lowest
         self._cells.write(window, channels)
         self._tops.write(window, np.minimum(cells.pressed, cells.lowest.max(axis=0, keepdims=True)) + cells.loose)
         step.at_rest = least == 1

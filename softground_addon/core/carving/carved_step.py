@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from ..numerics.arrays import Array, Indices, Mask
 from ..record.footprints import QUANTUM, Changes, Footprint, FootprintRecorder
+from ..record.throws import WADE, WEIGHT, Throw, ThrowKind
 from ..soles.deep_ground import wading
 from .carver import Walls
 
@@ -29,6 +30,8 @@ class CarvedStep:
     packed: float = 0.0
     unplaced: float = 0.0
     at_rest: bool = True
+    ploughed: dict[float, Array] = field(default_factory=dict)
+    """Samples of what it threw (see `record.throws.Throw`), by frame."""
 
     @cached_property
     def begins(self) -> float:
@@ -77,6 +80,23 @@ class CarvedStep:
                 raised += np.bincount(cells[part], amounts[part], window.cells)
                 moves = True
         return raised.reshape(window.rows, window.columns) if moves else None
+
+    def plough(self, frame: float, volume: float, points: Array, velocity: Array) -> None:
+        """Note a volume that flies from points (L, 3), and the velocity (3,) of what ploughs [m³, m, m/s]."""
+        if volume < self.ploughed.get(frame, np.zeros(1))[WEIGHT]:  # of several parts, what throws most
+            return
+        aim, velocities = velocity / np.linalg.norm(velocity), np.tile(velocity, (len(points), 1))
+        self.ploughed[frame] = np.concatenate([[volume], aim, points.ravel(), velocities.ravel()])
+
+    def throw(self, number: int) -> Throw | None:
+        """What it threw as it ploughed, as that of a step of a number; None if nothing."""
+        if not self.ploughed:
+            return None
+        first, last, step = min(self.ploughed), max(self.ploughed), self.footprint.frame_step
+        rows = np.zeros((round((last - first) / step) + 1, len(self.ploughed[first])))
+        for frame, row in self.ploughed.items():
+            rows[round((frame - first) / step)] = row
+        return Throw(number, WADE, ThrowKind.PLOUGH, False, first, step, 0.0, first, rows.astype(np.float32))
 
     @property
     def spacing(self) -> float:

@@ -13,7 +13,7 @@ Terzaghi 1943, "Theoretical Soil Mechanics", doi:10.1002/9780470172766: the heig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import ceil, pi, tan
 
@@ -89,10 +89,18 @@ class Walls:
         strength = cut * tan(pi / 4 + repose / 2) if surface.wall_cohesion else 0.0
         return cls(surface.wall_packing, strength, repose, surface.wall_crumbling)
 
-    def reach(self, surface: Array, loose: Array, cell_size: float) -> int:
-        """Number of cells around a window that what slides may spread over, from its heights (rows, columns) [m]."""
-        drop = min(np.ptp(surface), loose.max() + max(np.ptp(surface) - self.strength, 0.0))
-        return ceil(drop / (tan(self.repose) * cell_size)) + 1
+    def reach(self, change: Array, loose: Array, cell_size: float) -> int:
+        """Number of cells around a window that what slides may spread over.
+
+        Parameters
+        ----------
+        change, loose : (rows, columns) float arrays
+            Height over the undisturbed ground, and that of what is loose [m].
+        """
+        rows, columns = (np.minimum(np.arange(count), np.arange(count)[::-1]) for count in change.shape)
+        falls = loose + np.maximum(np.ptp(change) - self.strength, 0.0)
+        spread = np.minimum(falls, np.ptp(change)) / (tan(self.repose) * cell_size)
+        return max(ceil((spread - np.minimum(rows[:, None], columns)).max()), 0) + 1
 
 
 @dataclass
@@ -115,6 +123,8 @@ class CarvedCells:
         Lowest underside K so far in the quarters of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
         Height of the loose matter [m].
+    broken : (rows, columns) float array
+        Height that has broken off the edges of walls [m].
     cut_height, packed, unplaced : float
         Sums of the heights that were cut of what stood, fell or rose as a rim, packed, and found no place around [m].
     """
@@ -126,6 +136,7 @@ class CarvedCells:
     pressed: Array
     lowest: Array
     loose: Array
+    broken: Array = field(default_factory=lambda: np.zeros(()))
     cut_height: float = 0.0
     packed: float = 0.0
     unplaced: float = 0.0
@@ -225,7 +236,7 @@ class CarvedCells:
     def crumble(self, deepest: Array, body: Mask, floor: Array | None = None) -> None:
         """Let the edges of walls to cut or pressed ground break off: what breaks lies loose where it stood.
 
-        Asked to again, a wall recedes hardly any further: a place breaks off to its depth below what it was.
+        Asked to again, a wall recedes hardly any further: a place breaks off to its depth, all in all.
 
         Parameters
         ----------
@@ -242,8 +253,7 @@ class CarvedCells:
         reach = [ceil(part * EDGE / self.cell_size) for part in (1 / 3, 2 / 3, 1)]
         drops = [-depth - lowest_within(surface, cells) for cells in reach]  # a hillside is no wall
         near = np.mean([drop > LEAST_DROP for drop in drops], axis=0)
-        before = np.maximum(np.minimum(self.pressed, self.terrain) - standing, 0.0)
-        broken = np.minimum(deepest * near - before, MOST_OF_DROP * drops[-1])
+        broken = np.minimum(deepest * near - self.broken, MOST_OF_DROP * drops[-1])
         if floor is not None:
             broken = np.minimum(broken, standing - floor)
         breaks = (broken > 0) & ~(self.closed | self.contact | body)
@@ -251,6 +261,7 @@ class CarvedCells:
         fallen = standing - self.standing
         self.cut_height += float(fallen.sum())
         self.loose += fallen
+        self.broken = self.broken + fallen
 
     def slide(self, walls: Walls, body: Mask, corner: tuple[int, int], sweeps: int) -> None:
         """Let slide what is too steep; a body that stands in the ground holds it.
@@ -289,11 +300,14 @@ def least_cut(contact: Mask, cell_size: float) -> Array:
     return np.where(contact, min(UNDER_SOLE, cell_size), TOLERANCE)
 
 
-def pieces(window: Window, cell_size: float, crumbling: float) -> Array:
-    """Depth to which each cell of a window may break off, (rows, columns) [m], in pieces of all `PIECES`."""
+def pieces(window: Window, cell_size: float, crumbling: float | Array) -> Array:
+    """Depth to which each cell of a window may break off, (rows, columns) [m], in pieces of all `PIECES`.
+
+    Of all cells at most the same `crumbling`, or each its own (rows, columns) [m].
+    """
     x, y = (axis.ravel() for axis in np.meshgrid(*window.centres(cell_size)))
     above = sum((noise(SEED + number, size, x, y) for number, size in enumerate(PIECES)), np.zeros(len(x)))
-    return np.asarray(crumbling * np.maximum(above, 0.0)).reshape(window.rows, window.columns)
+    return np.asarray(crumbling * np.maximum(above, 0.0).reshape(window.rows, window.columns))
 
 
 def _middle(quarters: Array) -> Array:

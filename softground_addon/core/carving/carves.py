@@ -26,6 +26,7 @@ from ..record.edits import UNCHANGED
 from ..record.footprints import Footprint, FootprintRecorder
 from ..record.moved_carve import placement, shifted
 from ..record.record import BakeRecord, EditableStep
+from ..record.throws import Throw
 from .carved_ground import CarvedGround, Part, numbered
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
@@ -64,9 +65,10 @@ def with_carves(
     ]
     if not responded:
         return record
-    carves = yield from carves_of.slices(responded, prints, ground, surface, len(record.footprints))
+    carves, throws = yield from carves_of.slices(responded, prints, ground, surface, len(record.footprints))
     where = {name: replace(placement(edit), shift_frames=0) for name, edit in record.edits.items()}
-    return replace(record, carves=carves, carved_with={name: edit for name, edit in where.items() if edit != UNCHANGED})
+    carved_with = {name: edit for name, edit in where.items() if edit != UNCHANGED}
+    return replace(record, carves=carves, carved_with=carved_with, throws=throws)
 
 
 def _as_the_body_steps(step: EditableStep) -> Footprint:
@@ -83,8 +85,8 @@ def carves_of(
     ground: SoftGround,
     surface: str,
     count: int,
-) -> Slices[dict[int, Footprint]]:
-    """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle.
+) -> Slices[tuple[dict[int, Footprint], list[Throw]]]:
+    """What bodies carve, by the number of the step that it goes with: of steps that sank beyond the ankle; with throws.
 
     Parameters
     ----------
@@ -129,7 +131,9 @@ def carves_of(
     for step in steps.values():
         yield
         carving.finish(step, float(frames[-1]))
-    return {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+    carved = {number: carving.footprint(step) for number, step in steps.items() if step.recorder.frames}
+    throws = [throw for number, step in steps.items() if number < count and (throw := step.throw(number))]
+    return carved, throws
 
 
 def _deep(footprints: Mapping[int, Footprint], first: float, last: float) -> set[int]:

@@ -10,7 +10,7 @@ distance from the middle.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..numerics.arrays import Array
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
-from ..record.throws import AIM, WEIGHT, Throw, ThrowKind
+from ..record.throws import AIM, WADE, WEIGHT, Throw, ThrowKind
 from . import flight
 
 Height = Callable[[Array, Array], Array]
@@ -125,7 +125,12 @@ def thrown_share(speed: float, radius: float, gravity: float) -> float:
 
 @sliced
 def sources(
-    thrown: Sequence[Throw], steps: Sequence[EditableStep], *, surface: str, gravity: float
+    thrown: Sequence[Throw],
+    steps: Sequence[EditableStep],
+    *,
+    surface: str,
+    gravity: float,
+    carves: Mapping[int, Footprint] | None = None,
 ) -> Slices[list[Source]]:
     """All that the steps of a record throw, at most the rim of each: that is what compaction leaves of what they press.
 
@@ -133,6 +138,8 @@ def sources(
     ----------
     steps : sequence of EditableStep
         With all of their rims.
+    carves : mapping of int to Footprint, optional
+        What bodies carved with them, by their numbers: what ploughs throws of what is loose there.
     gravity : float
         [m/s²]
     """
@@ -150,8 +157,12 @@ def sources(
         ]
         matter = surfaces.find(step.footprint.surface or surface).thrown
         volumes = [_volume(way, step.footprint, matter, gravity) for way in ways]
-        scale = min(1.0, step.footprint.rim_m3 / max(sum(volumes), 1e-300))
-        of_all += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
+        carve = (carves or {}).get(step.index)
+        for ploughs, most in ((False, step.footprint.rim_m3), (True, carve.rim_m3 if carve else 0.0)):
+            both = zip(ways, volumes, strict=True)
+            parts = [(way, volume) for way, volume in both if volume > 0 and (way.phase == WADE) == ploughs]
+            scale = min(1.0, max(most, 0.0) / max(sum(volume for _, volume in parts), 1e-300))
+            of_all += [Source(way, step, volume * scale) for way, volume in parts]
     return of_all
 
 
@@ -210,6 +221,8 @@ def _volume(throw: Throw, footprint: Footprint, matter: ThrownMatter, gravity: f
     if throw.kind == ThrowKind.LANDING:
         share = thrown_share(throw.speed, _radius(throw, footprint), gravity)
         return share * footprint.compressed_m3 * _landing_part(footprint, throw.landed_by) if share else 0.0
+    if throw.kind == ThrowKind.PLOUGH:  # as much as becomes single grains: none of what sticks together
+        return matter.fine * amount
     if throw.kind == ThrowKind.PUSH:
         return np.sqrt(footprint.area_m2) / 2 * PUSH_DEPTH * amount
     return matter.film * footprint.area_m2 * amount
@@ -252,7 +265,7 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float, most: int) -> 
         start, velocity = _corona(source, random, count, gravity)
     else:
         start, velocity = (part[of_lump] for part in _from_sole(throw, wholes, random))
-        if throw.kind == ThrowKind.PUSH:
+        if throw.kind in (ThrowKind.PUSH, ThrowKind.PLOUGH):
             velocity = _backward(throw.samples[which, AIM].astype(np.float64), velocity, random)
         else:
             start += (LUMP if lumps else 0.0) * (2 * random.random(start.shape) - 1)
@@ -324,7 +337,7 @@ def _scattered(velocity: Array, random: np.random.Generator) -> Array:
 
 
 def _backward(aim: Array, slide: Array, random: np.random.Generator) -> Array:
-    """Speeds of what a sole throws as it pushes off: against the force that drives the body, and up."""
+    """Speeds of what a sole throws as it pushes off, or a leg that ploughs: along the aim, and up."""
     speed = PUSH_SPEED * np.linalg.norm(slide, axis=1)
     low, high = np.radians(PUSH_ANGLES)
     angle = low + (high - low) * random.random(len(aim))

@@ -51,7 +51,8 @@ def thrown(
     if not (record.throws if loads is None else record.footprints):
         return record, None
     if loads is not None:
-        record = replace(record, throws=(yield from throws_of.slices(loads, record.footprints, surface=surface)))
+        of_steps = yield from throws_of.slices(loads, record.footprints, surface=surface)
+        record = replace(record, throws=[*record.throws, *of_steps])  # beside those of what ploughs
     try:
         return (yield from without_warnings(_thrown(record, ground, surface, cell_size, gravity)))
     except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
@@ -62,7 +63,9 @@ def _thrown(
     record: BakeRecord, ground: SoftGround, surface: str, cell_size: float, gravity: float
 ) -> Slices[tuple[BakeRecord, Debris]]:
     record = replace(record, thrown={})
-    thrown_by = yield from sources.slices(record.throws, record.steps, surface=surface, gravity=gravity)
+    thrown_by = yield from sources.slices(
+        record.throws, record.steps, surface=surface, gravity=gravity, carves=record.laid_carves
+    )
     record = replace(record, thrown=volumes(thrown_by))
     pressed = recompose(record.shaping, cell_size=cell_size)
     yield

@@ -246,6 +246,7 @@ def _wade(row: Event, step: EditableStep, carve: Footprint) -> Event:
         "depth_m": _rounded(depth.max()),
         "area_m2": _rounded(np.count_nonzero(depth) * cell**2),
         "duration_s": _rounded((end - start) * spacing),
+        "thrown_kg": _rounded(step.thrown.get("wade", 0.0) * surfaces.find(row["surface"]).density),
     }
 
 

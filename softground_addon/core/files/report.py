@@ -16,6 +16,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
+from ..record.throws import WADE
 from ..record.typical_depth import typical_of
 
 SCHEMA_VERSION = 1
@@ -102,7 +103,7 @@ def build(
         report["totals"]["carried_kg"] = dict(carried_kg)
     if carves:
         report["totals"]["carved_m3"] = sum(carve.compressed_m3 for carve in carves)
-        report["carved"] = _carved(carves)
+        report["carved"] = _carved(carves, [step for step, _ in steps])
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
     if gaps_mm is not None:
@@ -115,8 +116,8 @@ def build(
     return report
 
 
-def _carved(carves: Iterable[Footprint]) -> dict[str, dict[str, float]]:
-    """Volumes that each character cut, packed into walls, left loose, and found no place for [m³]."""
+def _carved(carves: Iterable[Footprint], steps: Iterable[EditableStep]) -> dict[str, dict[str, float]]:
+    """Volumes that each character cut, packed into walls, left loose, also what flew, and found no place for [m³]."""
     volumes: dict[str, dict[str, float]] = {}
     for carve in carves:
         packed = carve.compressed_m3 - carve.rim_m3 - carve.unplaced_rim_m3
@@ -124,6 +125,11 @@ def _carved(carves: Iterable[Footprint]) -> dict[str, dict[str, float]]:
         sums = volumes.setdefault(carve.character, {})
         for name, volume in zip(("cut_m3", "packed_m3", "loose_m3", "unplaced_m3"), of_step, strict=True):
             sums[name] = sums.get(name, 0.0) + volume
+    for step in steps:
+        if volume := step.thrown.get(WADE, 0.0):
+            sums = volumes[step.baked.character]
+            sums["loose_m3"] += volume  # which the rim lacks
+            sums["packed_m3"] -= volume
     return volumes
 
 

@@ -77,7 +77,7 @@ class BakeRecord:
         Throws of the baked steps.
     thrown : mapping of int to mapping of str to float
         Volumes that the edited steps have thrown, by their numbers and by phase [m³]: they are missing from the rims of
-        `edited` and `steps`, not from those of `footprints` and `pressed_again`.
+        `edited`, `steps` and `laid_carves`, not from those of `footprints`, `pressed_again` and `carves`.
     carves : mapping of int to Footprint
         What bodies carved beside their prints in deep ground, by the numbers of the steps that it goes with.
     carved_with : mapping of step id to StepEdit
@@ -117,7 +117,7 @@ class BakeRecord:
             if known is None or known[0][0] is not carve or known[0][1:] != (was, now):
                 known = (carve, was, now), moved_carve(carve, step.baked.position, was, now)
                 self._laid[step.index] = known
-            laid[step.index] = known[1]
+            laid[step.index] = step_throws.booked(known[1], step.thrown.get(step_throws.WADE, 0.0))
         return laid
 
     @property
@@ -142,7 +142,8 @@ class BakeRecord:
             baked = self.footprints[number % count]
             edited = None if edit.mute else self.pressed_again.get(number, None if copy else baked)
             lacking = self.thrown.get(number, {}) if edited else {}
-            edited = step_throws.booked(edited, sum(lacking.values())) if edited and lacking else edited
+            of_print = sum(volume for phase, volume in lacking.items() if phase != step_throws.WADE)
+            edited = step_throws.booked(edited, of_print) if edited else edited
             steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, edited, edit, copy > 0, lacking))
         return steps
 

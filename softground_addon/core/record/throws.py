@@ -18,7 +18,7 @@ import numpy as np
 from ..numerics.arrays import Array
 from ..numerics.packed import Packed
 from .edits import StepEdit
-from .footprints import Footprint
+from .footprints import QUANTUM, Footprint
 
 _Part = TypeVar("_Part")
 
@@ -37,6 +37,11 @@ class ThrowKind(IntEnum):
     LANDING = 0
     PUSH = 1
     SHED = 2
+    PLOUGH = 3
+
+
+WADE = "wade"
+"""Phase of what is thrown by bodies that carve: it is missing from what they left loose."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,8 @@ class Throw:
     landed_by : float
         Scene frame until which the landing compacts the ground.
     samples : (K, 4 + 6·L) float array
-        At K times: the share that is thrown, of all that a print of its size throws; the unit vector that it is thrown
+        At K times: the share that is thrown, of all that a print of its size throws, or the volume that is ploughed
+        [m³]; the unit vector that it is thrown
         along, 0 where it goes with the sole; L points of the sole [m], and their velocities [m/s].
     """
 
@@ -160,8 +166,10 @@ def booked(footprint: Footprint, volume: float) -> Footprint:
     volume = min(volume, footprint.rim_m3)
     if not volume > 0 or not footprint.rim_m3 > 0:
         return footprint
-    remaining = 1.0 - volume / footprint.rim_m3
-    amounts = np.asarray(footprint.rim.amounts)
+    amounts, lies = np.asarray(footprint.rim.amounts), footprint.rim_m3
+    if not len(footprint.contact_cells):  # thin layers of a carve are recorded with the next
+        lies = max(float(amounts.sum(dtype=np.float64)) * QUANTUM * footprint.cell_size**2, volume)
+    remaining = 1.0 - volume / lies
     order = np.argsort(np.asarray(footprint.rim.cells), kind="stable")
     # Rounded along each cell's sums, so that no cell loses more than a quantum whatever it went through.
     total = np.cumsum(amounts[order].astype(np.int64))

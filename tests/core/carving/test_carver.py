@@ -247,6 +247,19 @@ def test_walls_recede_hardly_further_however_many_go_by():
     assert cells.cut_height < 1.3 * once
 
 
+def test_a_ridge_between_two_holes_breaks_off_once_though_a_leg_has_cut_it_down():
+    cells, walls, window = trench(0.01, "snow")
+    nobody, ridge = np.zeros(cells.loose.shape, bool), slice(27, 33)
+    cells.lowest[:, :, ridge] = -0.15
+    before = cells.standing
+    for _ in range(2):
+        cells.crumble(pieces(window, 0.01, walls.crumbling), nobody)
+    fallen = (before - cells.standing)[:, ridge]
+    assert 0.3 < (fallen > 0).mean() < 0.7, "in pieces"
+    assert (fallen <= pieces(window, 0.01, walls.crumbling)[:, ridge] + 1e-12).all()
+    assert cells.loose.sum() == pytest.approx(cells.cut_height, rel=1e-12)
+
+
 @pytest.mark.parametrize("height", [0.0, 5.0])
 def test_neither_the_edge_of_a_ground_nor_a_bank_that_nobody_cut_breaks(height):
     cells, walls, window = trench(0.01, "snow", bottom=np.inf)
