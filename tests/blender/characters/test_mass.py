@@ -180,3 +180,13 @@ def test_an_animal_whose_front_legs_have_no_names_is_no_person(scene):
     assert len(character.soles) == 4
     assert {"hip_l", "knee_l", "ankle_l"} <= {*character.joints.keys()}
     assert not has_legs(character)
+
+
+def test_shoes_on_a_body_of_curves_do_not_tell_its_mass(scene):
+    armature = shots.walker(scene, frames=30)
+    bpy.data.objects.remove(armature.children[0])
+    for side in "LR":
+        mesh_on(armature, "Shoe", *cylinder(0.05, 0.0, 0.1), f"foot.{side}", hung=True)
+    character = added(scene)
+    assert character.skin_mass == 0
+    assert character.mass == pytest.approx(77.5)
