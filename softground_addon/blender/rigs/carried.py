@@ -1,4 +1,4 @@
-"""Objects that the bones of a rig carry: they hang on one, as children or by a constraint, or on what does."""
+"""Objects that the bones of a rig carry: they hang on one, as children or by a constraint."""
 
 from __future__ import annotations
 
@@ -24,14 +24,8 @@ def carrier_of(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | N
     if parent == armature and obj.parent_type == "BONE":
         bone = armature.data.bones.get(obj.parent_bone)
         return (bone.name, on_bone(obj, bone)) if bone else None
-    if obj.animation_data:
-        return None
-    if any(not constraint.mute for constraint in obj.constraints):
-        return _held(obj, armature)
-    if parent is None or obj.parent_type != "OBJECT" or parent.type == "ARMATURE":
-        return None
-    above = carrier_of(parent, armature)
-    return above and (above[0], above[1] @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis))
+    is_held = not obj.animation_data and any(not constraint.mute for constraint in obj.constraints)
+    return _held(obj, armature) if is_held else None
 
 
 def on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
