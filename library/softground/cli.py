@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ._core.errors import BakeError, InputError, SoftGroundError
-from ._core.files import files
+from ._core.files import files, opensim
 from ._core.ground import presets as presets_of_core
 from ._core.ground.material import GroundMaterial
 from .body import GRAVITY, Body
@@ -102,8 +102,8 @@ def _forces(options: argparse.Namespace) -> None:
     if picture is not None and not picture.name:
         picture = options.file.with_name(f"{options.file.stem}_forces.png")
         _check_new(picture, f"replace it by --plot {picture}")
-    if options.opensim and options.opensim.suffix.lower() == ".mot" and not options.opensim.exists():
-        _check_new(options.opensim.with_suffix(".xml"), "give --opensim another name")
+    if options.opensim:
+        opensim.loads_beside(options.opensim)
     loads = _loads(options)
     measured = plates_on_feet(loads.body).force if loads.body.plates else None
     print(f"{'sole':<8} {'from s':>8} {'to s':>8} {'peak N':>8} {'±':>6} {'impulse Ns':>11}")

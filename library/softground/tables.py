@@ -33,7 +33,7 @@ def to_opensim(loads: Loads, path: str | os.PathLike[str]) -> list[Path]:
     Raises
     ------
     InputError
-        If the file has another ending, or cannot be written.
+        If the file has another ending, cannot be written, or a file with the name of its external loads is none.
 
     References
     ----------
@@ -46,10 +46,10 @@ def to_opensim(loads: Loads, path: str | os.PathLike[str]) -> list[Path]:
         opensim.FootForce(sole.name, sole.side, sole.force, sole.centre_of_pressure, np.nan_to_num(sole.free_moment))
         for sole in loads.soles
     ]
+    external = opensim.loads_beside(target)
     files.write_text(target, opensim.storage(loads.body.name, loads.times, feet))
-    if target.suffix.lower() == ".sto":
+    if external is None:
         return [target]
-    external = target.with_suffix(".xml")
     files.write_text(external, opensim.external_loads(loads.body.name, target.name, feet))
     return [target, external]
 

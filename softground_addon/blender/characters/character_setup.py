@@ -21,7 +21,7 @@ from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_ar
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
 from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, time_stretch_of
-from .import_fixes import is_captured, mass_of, put_under, sizes_of
+from .import_fixes import extent_of, is_captured, mass_of, put_under, sizes_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
@@ -239,7 +239,7 @@ def _fill(unit_scale: float, character: SoftGroundCharacter, mapping: RigMapping
         sole.kind = "LIMB" if source.limb else "FOOT"
         for bone in source.parts:
             sole.parts.add().name = bone
-    _, character.size = sizes_of(unit_scale, character)
+    character.size = extent_of(unit_scale, character.armature) if character.armature else 0.0
 
 
 def free_name(characters: Any, name: str) -> str:

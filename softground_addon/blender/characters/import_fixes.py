@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -11,53 +11,61 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.people import has_two_legs, likely_mass, sizes_by_legs
-from ...core.rig.bones import extent, stature
-from ...core.rig.mapping import BoneEnd
+from ...core.motion.people import has_two_legs, likely_mass
+from ...core.rig.mapping import RigMapping
+from ...core.rig.rig_at_rest import sizes_at_rest
 from ..compat import HAS_SLOTS, action_curves, slot_of
 from ..rigs.frame_ranges import ancestors
 from ..sampling.skin_sampling import meshes_on
-from ..settings import frame_rate_of, time_stretch_of
+from ..settings import character_of, frame_rate_of, time_stretch_of
 
 
 def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
     """Its `CharacterMotion.stature` and `size` as its rig stands now [m]; 0 without bones."""
     if not character.armature:
         return 0.0, 0.0
-    joints = {joint.name: (joint.bone, joint.end.lower()) for joint in character.joints}
-    return sizes_at_rest(
-        unit_scale, character.armature, joints, soles=len(character.soles), has_skin=character.skin_mass > 0
-    )
+    return _sizes(unit_scale, character.armature, _mapping_of(character), has_skin=character.skin_mass > 0)
 
 
-def sizes_at_rest(
-    unit_scale: float, armature: bpy.types.Object, joints: Mapping[str, BoneEnd], *, soles: int, has_skin: bool
+def _sizes(
+    unit_scale: float, armature: bpy.types.Object, mapping: RigMapping, *, has_skin: bool
 ) -> tuple[float, float]:
-    """The same of an armature with some joints and so many soles, on whose number its size does not depend."""
     if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
         return 0.0, 0.0
-    bones = armature.data.bones
+    bones, leg = armature.data.bones, 0.0
     heads, world = np.zeros((len(bones), 3), dtype=np.float32), np.array(armature.matrix_world)
     bones.foreach_get("head_local", heads.reshape(-1))
-    sizes = stature(heads.astype(float), world), extent(heads.astype(float), world)
     names = [f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle")]
-    legs = [joints.get(name, ("", "")) for name in names]
+    legs = [mapping.joints.get(name, ("", "")) for name in names]
     if all(bone in bones for bone, _ in legs):
         ends = np.array([getattr(bones[bone], f"{end}_local") for bone, end in legs]).reshape(2, 3, 3)
-        lengths = np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1)
-        captured = has_two_legs(joints, soles) and not has_skin
-        sizes = sizes_by_legs(*sizes, float(lengths.sum(axis=1).mean()), captured=captured)
+        leg = float(np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1).sum(axis=1).mean())
+    sizes = sizes_at_rest(heads.astype(float), world, mapping, leg, has_skin=has_skin)
     return sizes[0] * unit_scale, sizes[1] * unit_scale
+
+
+def extent_of(unit_scale: float, armature: bpy.types.Object) -> float:
+    """Largest extent of an armature's bones at rest as it stands now [m], whatever its joints; 0 without bones."""
+    return _sizes(unit_scale, armature, RigMapping(), has_skin=True)[1]
+
+
+def _mapping_of(character: Any) -> RigMapping:
+    known = character_of(character)
+    return RigMapping(known.joints, known.soles)
 
 
 def has_legs(character: Any) -> bool:
     """True if a character stands on two legs, as people do."""
-    return has_two_legs(character.joints.keys(), len(character.soles))
+    mapping = _mapping_of(character)
+    return has_two_legs(mapping.joints, mapping.legs)
 
 
 def mass_of(character: Any) -> float:
     """Likely mass by the skin, or by the height where the skin is too large for it [kg]; 0 without a skin."""
-    return likely_mass(character.skin_mass, character.size, two_legs=has_legs(character))[0]
+    if not has_legs(character) or not (extent := extent_of(1.0, character.armature)):
+        return character.skin_mass
+    size = character.size * sizes_of(1.0, character)[1] / extent  # that of the skin, whatever the rig's scale is now
+    return likely_mass(character.skin_mass, size, two_legs=True)[0]
 
 
 def is_captured(character: Any) -> bool:

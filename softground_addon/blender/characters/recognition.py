@@ -33,6 +33,9 @@ MOST_FRAMES = 500
 FOOT_REACH = 0.2
 """A foot and the bone with most of the skin on which it stands are nearer than this, over the size of the rig."""
 
+COVERS = 0.5
+"""Extent of a body's skin over that of its joints from which its volume tells its mass."""
+
 SHARE = 0.3
 """Of a reading of the whole shot, as it is shown to the user."""
 
@@ -105,11 +108,11 @@ def recognise(
     weighing = skin_mass.slices(skin, bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
-        return Recognised(replace(mapping, mass=mass), skin)
+        return Recognised(replace(mapping, mass=mass * _covers(bones, skin, mapping)), skin)
     seen = yield from jobs.meanwhile(read, shown_by_skin.slices(bones, skin, recording))
     agreeing = (may_be for may_be in (mapping, shaped) if _agrees(bones, may_be, shaped, seen))
     joined = _joined(bones, skin, next(agreeing, RigMapping(method="skin")), seen)
-    return Recognised(replace(joined, mass=mass), skin, recording)
+    return Recognised(replace(joined, mass=mass * _covers(bones, skin, joined)), skin, recording)
 
 
 def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recognised]:
@@ -138,6 +141,12 @@ def _mapped(armature: bpy.types.Object, *, posed: bool = False, named: bool = Tr
         return map_rig(armature, posed=posed, named=named)
     except InputError:
         return RigMapping(method="skin")
+
+
+def _covers(bones: RigBones, skin: RigSkin, mapping: RigMapping) -> bool:
+    """True if a skin is that of the whole body, by its joints, and not only of shoes on a body of curves."""
+    joints = [bones[bone].end(end) for bone, end in mapping.joints.values()]
+    return not joints or bool(np.ptp(skin.vertices, axis=0).max() > COVERS * np.ptp(joints, axis=0).max())
 
 
 def _held(bones: RigBones, foot: SoleSource, seen: Iterable[SoleSource]) -> list[SoleSource]:

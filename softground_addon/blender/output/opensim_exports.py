@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import bpy
 import numpy as np
 
-from ...core.errors import InputError
 from ...core.files import files, opensim
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.free_moments import free_moments
@@ -34,21 +32,9 @@ def write(loads: Sequence[CharacterLoads], path: Path, start: int, end: int) -> 
             target = path.with_stem(next(name for name in numbered if name.casefold() not in taken))
             taken.add(target.stem.casefold())
         targets.append(target)
-        _check_free(target)
+        opensim.loads_beside(target)
     each = zip(loads, targets, strict=True)
     return [file for character, target in each for file in _write_one(character, target, start, end)]
-
-
-def _check_free(path: Path) -> None:
-    """Raise InputError if the external loads of a table would take the place of a file that is not its own."""
-    loads = path.with_suffix(".xml")
-    if path.suffix != ".mot" or not loads.exists():
-        return
-    if f"<datafile>{escape(path.name)}<" not in loads.read_text(encoding="utf-8", errors="replace"):
-        raise InputError(
-            f"'{loads.name}' is there already and is no external loads of '{path.name}', which are written beside it: "
-            "choose another name, or move that file."
-        )
 
 
 def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> list[Path]:
@@ -72,8 +58,8 @@ def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> l
         for number, sole in enumerate(character.motion.soles)
     ]
     files.write_text(path, opensim.storage(character.motion.name, time, feet))
-    if path.suffix != ".mot":
+    external = opensim.loads_beside(path)
+    if external is None:
         return [path]
-    loads = path.with_suffix(".xml")
-    files.write_text(loads, opensim.external_loads(character.motion.name, path.name, feet))
-    return [path, loads]
+    files.write_text(external, opensim.external_loads(character.motion.name, path.name, feet))
+    return [path, external]

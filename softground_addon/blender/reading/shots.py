@@ -31,7 +31,7 @@ from ...core.settings import BakeSettings
 from ...core.weather.felt_weather import weathering_of
 from .. import ground_slots, settings, tread_images
 from ..animation_layer.constraint_layer import LayerKind
-from ..characters.import_fixes import sizes_at_rest
+from ..characters.import_fixes import extent_of
 from ..ground import created_ground, ground_checks, ground_surface, painted_ground
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
@@ -290,14 +290,8 @@ def sample_characters(
                 check_rig(scene.objects, armature, mapping, character.mass_kg)
                 controls = controls_of(scene.view_layers[0], armature, mapping)
                 poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
-            _, size = sizes_at_rest(
-                scene.unit_settings.scale_length,
-                armature,
-                mapping.joints,
-                soles=len(mapping.soles),
-                has_skin=character.skin_mass_kg > 0,
-            )
-            grown = size / character.size_m if character.size_m else 1.0
+            extent = extent_of(scene.unit_settings.scale_length, armature)
+            grown = extent / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,
                 armature,

@@ -332,13 +332,18 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     for obj in _props_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
         parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
-    parts += [
-        f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
-        f"{input_hashes.of_shapes(worn)}"
-        for worn in _worn_by(objects, character)
-    ]
-    if character.armature:
-        rigs = worn_rigs(objects, settings.resolve(character.armature))
+    armature, known = settings.resolve(character.armature) if character.armature else None, dict[bpy.types.ID, str]()
+    for worn in _worn_by(objects, character):
+        carriers = [worn, *(above for above in ancestors(worn) if armature and above.type != "ARMATURE")]
+        held = [
+            text for obj in carriers for each in obj.constraints for text in input_hashes.of_settings(each, (), known)
+        ]
+        parts.append(
+            f"{_of_mesh(worn)} {carriers[-1].parent_bone} {input_hashes.of_weights(worn, bones)} "
+            f"{input_hashes.of_place(carriers)}{input_hashes.of_shapes(worn)}{input_hashes.joined(held)}"
+        )
+    if armature:
+        rigs = worn_rigs(objects, armature)
         parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 

@@ -19,7 +19,13 @@ LEVEL = 1e-6
 
 
 def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, int] | None:
-    """First and last frame of the animation of an object, and of those that it is parented to.
+    """First and last frame of the animation of an object, as `animated_range` has it."""
+    animated = animated_range(scene, obj)
+    return animated and (floor(animated[0]), ceil(animated[1]))
+
+
+def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | None:
+    """Times of the first key and the last of an object, and of those that it is parented to, in frames.
 
     Without any, of the leaders of its constraints. Curves that go on, by a modifier or by extrapolation, last as
     long as the scene.
@@ -32,7 +38,7 @@ def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int,
     start, end = (frame * time_stretch_of(scene) for frame in (scene.frame_start, scene.frame_end))
     first = min(starts) if -inf not in starts else start if start < keyed[1] or inf in ends else keyed[0]
     last = max(ends) if inf not in ends else end if end > first else keyed[1]
-    return floor(first), ceil(last)
+    return first, last
 
 
 def frames_with_shapes(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[int, int]:

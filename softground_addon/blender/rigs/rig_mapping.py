@@ -76,10 +76,12 @@ def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
     missing joints. Limbs on which the two disagree stay as they are named, and what is named a leg is no arm. Legs that
     are misread, so that none is named, are taken from the shape.
     """
-    if not named.soles:
-        return RigMapping({**shaped.joints, **named.joints}, shaped.soles, shaped.method)
     joints, soles, by_shape = dict(named.joints), named.soles, dict(shaped.joints)
     arms, named_legs = ({f"{joint}_{side}" for joint in limb for side in "lr"} for limb in (_ARM, _LEG))
+    if not named.soles:
+        taken = {by_shape[joint][0] for joint in named_legs & by_shape.keys()}
+        others = {joint: at for joint, at in joints.items() if joint not in named_legs and at[0] not in taken}
+        return RigMapping({**by_shape, **others}, shaped.soles, shaped.method)
     legs = {joints[joint][0] for joint in named_legs & joints.keys()}
     if any(by_shape[joint][0] in legs for joint in arms & by_shape.keys()):
         by_shape = {joint: place for joint, place in by_shape.items() if joint not in arms}

@@ -15,6 +15,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.rig.rig_skin import RigSkin, Shape
 from .. import mesh_arrays
 from ..placement import beside
+from ..rigs.carried import carrier_of, on_bone
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
 from ..settings import ObjectName, Objects, name_of, resolve
@@ -40,17 +41,18 @@ def meshes_on(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Ob
 def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
     """The meshes on some bones of an armature that `meshes_on` leaves out, as they are not rendered."""
     read = meshes_on(objects, armature)
-    return [obj for obj in _worn_by(objects, armature) if obj not in read and _is_on(obj, bones)]
+    return [obj for obj in _worn_by(objects, armature) if obj not in read and _is_on(obj, armature, bones)]
 
 
 def left_out_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> dict[str, list[str]]:
     """Deformers of the meshes on some bones that are not read, by the name of the mesh."""
-    on_bones = (obj for obj in meshes_on(objects, armature) if _is_on(obj, bones))
+    on_bones = (obj for obj in meshes_on(objects, armature) if _is_on(obj, armature, bones))
     return {obj.name: names for obj in on_bones if (names := left_out(obj))}
 
 
-def _is_on(obj: bpy.types.Object, bones: Collection[str]) -> bool:
-    return obj.parent_bone in bones or bool({group.name for group in obj.vertex_groups} & set(bones))
+def _is_on(obj: bpy.types.Object, armature: bpy.types.Object, bones: Collection[str]) -> bool:
+    carried = carrier_of(obj, armature)
+    return bool(carried and carried[0] in bones) or bool({group.name for group in obj.vertex_groups} & set(bones))
 
 
 def _worn_by(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
@@ -71,7 +73,7 @@ def _deformed_by(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
 
 
 def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
-    return obj.parent == armature and obj.parent_type == "BONE" and obj.parent_bone in armature.data.bones
+    return (obj.parent_type == "BONE" or not _deformed_by(obj, armature)) and carrier_of(obj, armature) is not None
 
 
 SHOD = 0.3
@@ -166,13 +168,14 @@ def mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
 
 
 def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape, ...]) -> _Piece:
-    mesh, bone = mesh_of(obj), armature.data.bones[obj.parent_bone]
-    to_armature = _on_bone(obj, bone)
+    mesh, carried = mesh_of(obj), carrier_of(obj, armature)
+    assert carried, obj.name
+    bone, to_armature = carried
     count = len(mesh.vertices)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
         mesh_arrays.triangles(mesh),
-        (bone.name,),
+        (bone,),
         np.arange(count),
         np.zeros(count, dtype=np.intp),
         np.ones(count),
@@ -181,19 +184,10 @@ def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape
     )
 
 
-def _on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
-    """The place of an object that hangs on a bone, in the space of the bone's armature at rest, (4, 4)."""
-    parent = np.eye(4)
-    if not bone.use_relative_parent:
-        parent = np.array(bone.matrix_local)
-        parent[:3, 3] += parent[:3, 1] * bone.length
-    return np.asarray(parent @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis))
-
-
 def _carried(piece: _Piece, rig: bpy.types.Object, body: bpy.types.Object) -> _Piece:
     """A mesh on a rig that a body wears, as one on the body's bones that carry it."""
     name, held = hung_on(rig, body), carriers(rig, body)
-    rest = (name, _on_bone(rig, body.data.bones[name])) if name else next(iter(held.values()))
+    rest = (name, on_bone(rig, body.data.bones[name])) if name else next(iter(held.values()))
     names, matrices = zip(*(held.get(name, rest) for name in piece.names), strict=True) if piece.names else ((), ())
     bones, number = np.unique(np.array(names, dtype=str), return_inverse=True)
     to_body = np.array([*matrices, rest[1]])

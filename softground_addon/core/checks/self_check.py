@@ -12,6 +12,7 @@ from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
 from ..imprints.sole_points import places, sole_points
 from ..loads.estimate import CharacterLoads
+from ..loads.hovering import hovering
 from ..loads.missed_steps import advice, missed_steps
 from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion
@@ -20,7 +21,6 @@ from ..motion.sole_motion import shortest_length
 from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
-from .hovering import hovering
 from .skin_check import OFF_SKIN, level_on_slope, skin_check
 
 PERSON_LEG = 0.87
@@ -71,6 +71,9 @@ def self_check(
     for character in loads:
         yield
         motion = character.motion
+        if character.hovers:
+            findings += [hovering(motion.name, character.hovers), *_size(motion, cell_size)]
+            continue
         steps = [footprint for footprint in footprints if footprint.character == motion.name]
         findings += _prints(character, steps, ground)
         findings += _size(motion, cell_size)
@@ -127,8 +130,6 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
     missed = missed_steps(motion, character.contacts)
     if missed:
         yield advice(motion.name, missed, f"'{ground}'")
-    if floats := hovering(character):
-        yield floats
     belt = treadmill_speed(motion, character.contacts)
     if belt > 0:
         yield Finding(
@@ -154,7 +155,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
         )
     if motion.centre is not None:
         return  # a prop has no legs to go by
-    captured = motion.two_legs and all(sole.sole.underside is None for sole in motion.soles)
+    captured = motion.two_legs and all(sole.sole.underside is None for sole in motion.soles if sole.sole.prop is None)
     if unit := wrong_unit(motion.stature, captured=captured):
         size = f"{motion.stature:.0f} m" if motion.stature > 1 else f"{motion.stature * 100:.2g} cm"
         yield Finding(

@@ -14,6 +14,7 @@ from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import Terrain
 from ..ground.terrain import MeshTerrain
 from ..loads.estimate import CharacterLoads, estimate_loads
+from ..loads.hovering import hovering
 from ..motion.motion import CharacterMotion
 from ..numerics.slices import Slices, sliced
 from ..settings import BakeSettings
@@ -64,6 +65,8 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, grounds: 
     parts = whole.grounds if isinstance(whole, SeveralGrounds) else (whole,)
     name = listed(grounds) or "the ground"
     if not any(character.contacts.standing.any() for character in loads):
+        if floats := [hovering(character.motion.name, character.hovers) for character in loads if character.hovers]:
+            raise InputError(floats[0].message, floats[0].code, remedy=floats[0].remedy)
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         message = f"No foot of {characters} touches {name} in these frames"
         raise InputError(message, "no_contact", remedy="move the ground under the feet, or correct the feet.")

@@ -27,9 +27,15 @@ EASE = 1 / 24
 WHOLE = 0.3
 """Part of a frame by which it may be longer than whole frames: at 30 a second, keys of 24 are seen in no second one."""
 LATE = 0.0, 0.25, 0.5, 0.75
-"""Part of a frame after which the first key may come: it is held until then."""
+"""Part of a frame after which the first key may come where that is not known: it is held until then."""
+SAME_TIME = 1e-3
+"""Keys that are nearer to a frame are on it, in frames."""
 HANDLE = 1 / 2.5614
 """Length of an automatic handle, in times between keys."""
+NEAREST = 0.5
+"""Frames from the first key, or to the last, within which the next sample tells no speed."""
+FEW = 4
+"""Samples of motions that are too short for that."""
 STARTS = 0.01
 """A body that moves less in that time stands or stops, in leg lengths (0.2 m/s for an adult)."""
 STEADY = 0.6
@@ -53,11 +59,21 @@ def without_holds(motion: CharacterMotion) -> CharacterMotion:
     the keys at both ends of the action. Soles alone do not tell held poses from feet that all stand while their body
     goes on: without joints, skin bears when it did.
     """
-    held = _held(motion) | _eased(motion)
-    if not held.any():
+    every, places = np.arange(len(motion.frames), dtype=float), _places(motion)
+    held = _held(motion) | _eased(motion, places)
+    for end, beside in ((0, 1), (-1, -2)) if len(held) > FEW else ():
+        held[beside] |= abs(places[end] - places[beside]) < NEAREST
+    known = np.flatnonzero(~held)
+    if len(known) == len(held) and (places == every).all():
         return motion
-    known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
-    smooth = _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
+
+    def bridged(samples: Array) -> Array:
+        shown = samples[known].copy()
+        shown[0] = _beyond(samples[known[:3]], places[known[:3]], 0.0)
+        shown[-1] = _beyond(samples[known[:-4:-1]], places[known[:-4:-1]], every[-1])
+        return cubic(shown, every, every[known])
+
+    smooth = _mapped(motion, bridged)
     if motion.joints:
         return smooth
     pairs = zip(smooth.soles, motion.soles, strict=True)
@@ -147,7 +163,29 @@ def _held(motion: CharacterMotion) -> Mask:
     return held
 
 
-def _eased(motion: CharacterMotion) -> Mask:
+def _places(motion: CharacterMotion) -> Array:
+    """Places of the samples among themselves: of the first and the last, where keys begin and end within a frame of
+    them, that of the key; its pose is held from there."""
+    count = len(motion.frames)
+    places = np.arange(count, dtype=float)
+    if motion.animated and count > 1:
+        first, last = (np.array(motion.animated) - motion.frames[0]) / (motion.frames[1] - motion.frames[0])
+        if SAME_TIME < first < 1:
+            places[0] = first
+        if SAME_TIME < count - 1 - last < 1:
+            places[-1] = last
+    return places
+
+
+def _beyond(samples: Array, places: Array, at: float) -> Array:
+    """Value at a place, by the parabola through three samples (3, ...) at theirs; the first one at its own."""
+    if len(places) < 3 or at == places[0]:
+        return np.asarray(samples[0])
+    shares = [np.prod([(at - other) / (place - other) for other in places if other != place]) for place in places]
+    return np.tensordot(shares, samples, 1)
+
+
+def _eased(motion: CharacterMotion, places: Array) -> Mask:
     """Frames within `EASE` of an end at which the whole body eases as between keys.
 
     The first and the last key of a cut take have flat handles: what walks on in the take seems to stand there, the more
@@ -157,9 +195,10 @@ def _eased(motion: CharacterMotion) -> Mask:
     eased, between = np.zeros(len(motion.frames), dtype=bool), EASE / motion.time_step
     if not 1 < ceil(between - WHOLE) < len(eased) / 4:
         return eased
-    for order in (slice(None), slice(None, None, -1)):
+    for order, known in ((slice(None), places[0]), (slice(None, None, -1), len(eased) - 1 - places[-1])):
         path = np.stack([path[order][: ceil(3 * between) + 2] for path in paths], axis=1)
-        ends = [ceil(late + between - WHOLE) for late in LATE if _eases(path, between, late, motion.leg_length)]
+        late = (float(known),) if known else LATE
+        ends = [ceil(held + between - WHOLE) for held in late if _eases(path, between, held, motion.leg_length)]
         eased[order][1 : max(ends, default=1)] = True
     return eased
 

@@ -12,10 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 import numpy as np
 
+from ..errors import InputError
 from ..numerics.arrays import Array
 
 _BODIES = {"L": "calcn_l", "R": "calcn_r"}
@@ -79,6 +82,27 @@ def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
     head = [name, "version=1", f"nRows={len(table)}", f"nColumns={len(labels)}", "inDegrees=yes", "endheader"]
     rows = ["\t".join(f"{value:.6f}" for value in row) for row in table.tolist()]
     return "\n".join([*head, "\t".join(labels), *rows, ""])
+
+
+def loads_beside(table: Path) -> Path | None:
+    """Name of the external loads beside a table of forces; None beside a .sto, which has none.
+
+    Raises
+    ------
+    InputError
+        If a file has that name and is no external loads of that table.
+    """
+    if table.suffix.lower() != ".mot":
+        return None
+    loads = table.with_suffix(".xml")
+    if loads.exists() and f"<datafile>{escape(table.name)}<" not in loads.read_text("utf-8", errors="replace"):
+        raise InputError(
+            f"'{loads.name}' is there already and is no external loads of '{table.name}', which are written beside it: "
+            "choose another name, or move that file.",
+            "file_exists",
+            path=loads,
+        )
+    return loads
 
 
 def external_loads(name: str, storage_file: str, feet: Sequence[FootForce]) -> str:

@@ -7,8 +7,10 @@ the whole body's dynamics do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from ..dynamics.body_dynamics import body_dynamics
 from ..dynamics.continuation import continued, without_holds
@@ -21,6 +23,7 @@ from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts
 from .forces import ContactForces, impulse_forces, whole_body_forces
 from .free_bodies import free_loads
+from .hovering import hovers
 from .jumps import FEWEST, joined
 from .missing_ground import beyond_edge, without_missing
 from .sliding import treadmill_speed
@@ -30,11 +33,18 @@ ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
 
 @dataclass(frozen=True)
 class CharacterLoads:
-    """Loads of one character on the ground, on the simulation's time grid."""
+    """Loads of one character on the ground, on the simulation's time grid.
+
+    Attributes
+    ----------
+    hovers : float
+        Share of the frames in which nothing of it touches, if it hovers and so has no contacts; else 0.
+    """
 
     motion: CharacterMotion
     contacts: Contacts
     forces: ContactForces
+    hovers: float = 0.0
 
 
 def follows_landings(motion: CharacterMotion, force_model: ForceModel) -> bool:
@@ -97,4 +107,8 @@ def estimate_loads(
     if ground is not terrain or isinstance(terrain, HardOnSoft):
         contacts, forces = without_missing(source, terrain, contacts, forces)
     shown = slice(shot.start * steps, (shot.stop - 1) * steps + 1)
-    return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))
+    motion, contacts, forces = motion.resampled(steps), contacts.during(shown), forces.during(shown)
+    if share := hovers(motion, contacts):
+        none = np.zeros_like(contacts.touching)
+        contacts, forces = replace(contacts, touching=none), forces.of(none)
+    return CharacterLoads(motion, contacts, forces, share)

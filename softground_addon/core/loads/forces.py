@@ -17,7 +17,7 @@ from ..dynamics.centre_of_mass import centre_of_mass
 from ..dynamics.centre_of_pressure import centres_of_pressure, lowest_points
 from ..dynamics.load_sharing import point_of_action, share_by_moment, whole_body_shares
 from ..motion.motion import CharacterMotion
-from ..numerics.arrays import Array
+from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
 from .contacts import Contacts
 
@@ -56,6 +56,12 @@ class ContactForces:
     def during(self, steps: slice) -> ContactForces:
         """The forces at some of the steps."""
         return ContactForces(*(getattr(self, field.name)[steps] for field in dataclasses.fields(self)))
+
+    def of(self, bearing: Mask) -> ContactForces:
+        """The forces of those soles alone that bear, (N, S)."""
+        forces = self.forces * bearing[..., None]
+        weight, momentum = self.weight * bearing, self.momentum * bearing
+        return dataclasses.replace(self, forces=forces, total=forces.sum(axis=1), weight=weight, momentum=momentum)
 
 
 def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> ContactForces:

@@ -91,18 +91,7 @@ def without_missing(
     if hard is not None:
         touching, missing = touching & ~hard, missing & ~hard
     clearance = np.where(missing, np.inf, contacts.clearance)
-    on_ground = ~missing
-    pressing = forces.forces * on_ground[..., None]
-    return (
-        replace(contacts, touching=touching, clearance=clearance, hard=hard),
-        replace(
-            forces,
-            forces=pressing,
-            total=pressing.sum(axis=1),
-            weight=forces.weight * on_ground,
-            momentum=forces.momentum * on_ground,
-        ),
-    )
+    return replace(contacts, touching=touching, clearance=clearance, hard=hard), forces.of(~missing)
 
 
 def _on_hard(motion: CharacterMotion, terrain: HardOnSoft, contacts: Contacts) -> Mask:

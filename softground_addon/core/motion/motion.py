@@ -114,6 +114,8 @@ class CharacterMotion:
         joints tell it.
     four_legged : bool
         An animal on four legs: its mass is distributed otherwise than a man's.
+    legs : int or None
+        How many of its soles are those of legs; None for all.
     ground_level : float or None
         Height at which its skin rests on level ground [m], where that was seen.
     skin : LowSkin or None
@@ -128,6 +130,8 @@ class CharacterMotion:
         True if some bone that was read moves, though it may carry no joint and no sole: a head that nods.
     ride : GroundRide or None
         Of the ground, in whose frame all of this is, where that moves.
+    animated : (float, float) or None
+        Scene frames of the first key and the last, where that is known: before and after, poses are held.
     """
 
     name: str
@@ -140,12 +144,14 @@ class CharacterMotion:
     gravity: float = 9.81
     centre: Array | None = None
     four_legged: bool = False
+    legs: int | None = None
     ground_level: float | None = None
     skin: LowSkin | None = None
     stature: float = 0.0
     size: float = 0.0
     bones_move: bool = False
     ride: GroundRide | None = None
+    animated: tuple[float, float] | None = None
 
     @property
     def times(self) -> Array:
@@ -169,7 +175,7 @@ class CharacterMotion:
     @property
     def two_legs(self) -> bool:
         """True if it stands on two legs, as people do."""
-        return not self.four_legged and has_two_legs(self.joints, len(self.soles))
+        return not self.four_legged and has_two_legs(self.joints, len(self.soles) if self.legs is None else self.legs)
 
     @property
     def stands_still(self) -> bool:

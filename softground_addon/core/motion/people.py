@@ -17,25 +17,25 @@ MASS_RANGE = 4.0
 _LEGS = frozenset(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in "lr")
 
 
-def has_two_legs(joints: Collection[str], soles: int) -> bool:
-    """True for joints of two legs on which a body stands with as many soles."""
-    return _LEGS.issubset(joints) and soles == 2
+def has_two_legs(joints: Collection[str], legs: int) -> bool:
+    """True for joints of two legs, if a body has no more that print."""
+    return _LEGS.issubset(joints) and legs == 2
 
 
-def sizes_by_legs(stature: float, size: float, leg: float, *, captured: bool) -> tuple[float, float]:
+def sizes_by_legs(stature: float, size: float, leg: float, *, has_skin: bool) -> tuple[float, float]:
     """Stature and size of a body on two legs [m], from those of its joints at rest and its thigh and shank together.
 
     Captured motion, without a skin, may have a split as its rest pose; and no joint is at the top of a head.
 
     Examples
     --------
-    >>> [round(length, 2) for length in sizes_by_legs(1.0, 1.84, 0.8, captured=True)]
+    >>> [round(length, 2) for length in sizes_by_legs(1.0, 1.84, 0.8, has_skin=False)]
     [1.63, 1.84]
-    >>> [round(length, 2) for length in sizes_by_legs(1.55, 1.55, 0.874, captured=False)]
+    >>> [round(length, 2) for length in sizes_by_legs(1.55, 1.55, 0.874, has_skin=True)]
     [1.55, 1.78]
     """
     height = leg / LEG_SHARE
-    return height if captured and height else stature, max(size, height)
+    return stature if has_skin or not height else height, max(size, height)
 
 
 def likely_mass(by_volume: float, size: float, *, two_legs: bool) -> tuple[float, str]:

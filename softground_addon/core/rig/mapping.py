@@ -61,6 +61,12 @@ class RigMapping:
     method: str = "names"
     mass: float = 0.0
 
+    @property
+    def legs(self) -> int:
+        """Number of contacts of legs: no objects, and no limbs on bones that have a joint, such as hands and knees."""
+        jointed = {bone for bone, _ in self.joints.values()}
+        return sum(not (sole.object or (sole.limb and sole.bone in jointed)) for sole in self.soles)
+
 
 def bones_of(mapping: RigMapping) -> list[str]:
     """The bones of a mapping's soles and joints."""

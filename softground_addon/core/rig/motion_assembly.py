@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CENTRE, CharacterMotion
-from ..motion.people import has_two_legs, sizes_by_legs
 from ..motion.props import capsule
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array
@@ -27,10 +26,10 @@ from ..soles.foot_attitude import (
     standing_up,
 )
 from ..soles.soles import PlacedSole, prop_sole
-from .bones import RigBones, extent, stature
+from .bones import RigBones
 from .mapping import RigMapping, SoleSource
 from .recording import Recording
-from .rig_at_rest import RestPose
+from .rig_at_rest import RestPose, sizes_at_rest
 from .rig_skin import RigSkin
 from .skin_mass import centre_of_volume
 from .skin_stances import SkinStances
@@ -121,10 +120,8 @@ def assemble_motion(
         joints[CENTRE] = centre_of_volume(skin, bones, recording)
 
     heads = np.array([bone.head for bone in bones.values()])
-    four_legged = rest.is_four_legged(mapping)
-    sizes_at_rest = stature(heads, recording.armature[0]), extent(heads, recording.armature[0])
-    if has_two_legs(mapping.joints, len(mapping.soles)) and not four_legged:
-        sizes_at_rest = sizes_by_legs(*sizes_at_rest, leg, captured=skin is None)
+    placed, has_skin = recording.armature[0], skin is not None
+    tall, large = sizes_at_rest(heads, placed, mapping, leg, has_skin=has_skin)
     return CharacterMotion(
         name=name,
         mass=mass,
@@ -134,12 +131,14 @@ def assemble_motion(
         soles=tuple(motions[source.name] for source in mapping.soles),
         joints=joints,
         gravity=gravity,
-        four_legged=four_legged,
+        legs=mapping.legs,
+        four_legged=rest.is_four_legged(mapping),
         ground_level=stances.level if stances else None,
         skin=stances.skin if stances else None,
         bones_move=recording.bones_move,
-        stature=sizes_at_rest[0],
-        size=sizes_at_rest[1],
+        stature=tall,
+        size=large,
+        animated=recording.animated,
     )
 
 

@@ -60,6 +60,8 @@ class Recording:
         What frames and Blender units come to.
     shapes : mapping of (object, shape key) to (F,) float array
         Values of shape keys.
+    animated : (float, float) or None
+        Scene frames of the first key and the last, where there are keys.
     """
 
     frames: Array
@@ -69,6 +71,7 @@ class Recording:
     props: Mapping[str, Array]
     units: SceneUnits
     shapes: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    animated: tuple[float, float] | None = None
 
     @property
     def armature(self) -> Array:

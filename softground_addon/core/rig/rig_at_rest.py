@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..motion.people import has_two_legs, sizes_by_legs
 from ..numerics.arrays import Array
 from ..numerics.rigid import rotation, turn_between, unit
 from ..soles.foot_attitude import UP
-from .bones import RigBones
+from .bones import RigBones, extent, stature
 from .mapping import RigMapping
 
 _ACROSS, _ALONG = 0.6, 0.7
@@ -99,6 +100,24 @@ class RestPose:
                 if np.linalg.norm(across[:2]) > 0:
                     return across
         return np.zeros(3)
+
+
+def sizes_at_rest(
+    heads: Array, to_world: Array, mapping: RigMapping, leg: float, *, has_skin: bool
+) -> tuple[float, float]:
+    """`CharacterMotion.stature` and `size` of a rig at rest, in the units of the world.
+
+    Parameters
+    ----------
+    heads : (N, 3) float array
+        Of its bones, in the armature's space.
+    to_world : (4, 4) float array
+        From there to the world.
+    leg : float
+        Thigh and shank together.
+    """
+    sizes = stature(heads, to_world), extent(heads, to_world)
+    return sizes_by_legs(*sizes, leg, has_skin=has_skin) if has_two_legs(mapping.joints, mapping.legs) else sizes
 
 
 def _own_up(bones: RigBones, mapping: RigMapping, placed: Array) -> Array:

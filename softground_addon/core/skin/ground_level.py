@@ -114,7 +114,11 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
     lowest = tracks.lowest
     speed = max(float(np.linalg.norm(drift)), 1.0)
     agrees = np.clip(1.5 - tracks.slip(drift) / (4 * SAME_WAY * speed), 0.1, 1.0)
-    weight = _calm(tracks) * agrees * np.clip(1 - (tracks.low - lowest[:, None]) / REACH, 0.0, None)
+    calm = _calm(tracks) * agrees
+    weight = calm * np.clip(1 - (tracks.low - lowest[:, None]) / REACH, 0.0, None)
+    lies, sinks = _at(0.0, tracks) * calm > WORTH, (tracks.low < -TOUCH) & (calm > WORTH)
+    if lies[0].sum() > max(sinks[0].sum(), 1):
+        weight = np.where(lies, calm, weight)  # also where arms that hang through the floor are lower
     if not weight.any():
         return float(np.percentile(lowest, OFTEN)), 0.0
     levels = np.arange(lowest.min(), (tracks.low[weight > 0]).max() + BIN, BIN)

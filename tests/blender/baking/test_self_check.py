@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.core.errors import InputError
 from tests.blender import shots
 from tests.blender.characters.test_recognition import LEGS, stool
 from tests.blender.grounds import bake, plane
@@ -118,11 +119,17 @@ def bobbing(scene, height, path, *, skin=True):
 
 @pytest.mark.parametrize("skin", [True, False])
 @pytest.mark.parametrize(("bob", "period"), [(0.1, 1.5), (0.04, 1.0)])
-def test_a_body_that_hovers_is_said_to_print_only_where_it_dips(scene, bob, period, skin):
-    bobbing(scene, 0.9, lambda time: bob * np.sin(2 * np.pi * time / period), skin=skin)
+def test_a_body_that_hovers_is_said_to_and_leaves_no_print_where_it_dips(scene, bob, period, skin):
+    bobbing(scene, bob, lambda time: bob * np.sin(2 * np.pi * time / period), skin=skin)
+    with pytest.raises(InputError, match=r"'Walker' hovers, .* take it out of the characters"):
+        bake(scene)
+    scene.objects["Walker"].name = "Ghost"
+    shots.walker(scene, frames=72)
+    bpy.ops.softground.add_character()
     report = bake(scene).report
-    assert report["steps"]
+    assert {step["character"] for step in report["steps"]} == {"Walker"}
     assert "hovers" in codes(report)
+    assert not codes(report) & {"no_print", "missed_steps", "skin_without_step"}
 
 
 def test_hops_do_not_hover(scene):

@@ -6,7 +6,8 @@ import pytest
 
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
-from softground_addon.blender.characters.import_fixes import sizes_of
+from softground_addon.blender.characters.contact_editing import add_bone_contacts
+from softground_addon.blender.characters.import_fixes import extent_of, is_captured, sizes_of
 from softground_addon.blender.compat import HAS_SLOTS, action_curves, channels_of, slot_of
 from softground_addon.blender.reading import analysis
 from softground_addon.core.motion.units import scale_to_metres
@@ -67,7 +68,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     assert armature.parent.name == "Walker Scale"
     assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
     assert keys == keys_of(armature)
-    assert sizes_of(scene.unit_settings.scale_length, character)[1] == pytest.approx(character.size, rel=1e-4)
+    assert extent_of(scene.unit_settings.scale_length, armature) == pytest.approx(character.size, rel=1e-4)
     assert 1.0 < character.size < 2.0
     assert character.mass == pytest.approx(mass, rel=0.05)
     scene.softground.cell_size = 0.02
@@ -283,3 +284,18 @@ def test_captured_motion_is_as_tall_as_its_legs_are_long_whatever_its_rest_pose(
     stature, _ = sizes_of(1.0, character)
     assert stature == pytest.approx(scale * stood, rel=0.01)
     assert scale_to_metres(stature, captured=True) == pytest.approx(1 / scale, rel=0.06)
+
+
+def test_a_skeleton_of_a_person_stays_one_whatever_else_of_it_prints(scene):
+    armature = shots.walker(scene, frames=30)
+    bpy.data.objects.remove(armature.children[0])
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    character = scene.softground.characters[0]
+    sizes = sizes_of(1.0, character)
+    add_bone_contacts(character, ["hand.L"])
+    assert is_captured(character)
+    assert sizes_of(1.0, character) == sizes
+    (motion,) = analysis.read(scene).shot.motions
+    assert motion.two_legs
+    assert (motion.stature, motion.size) == pytest.approx(sizes)

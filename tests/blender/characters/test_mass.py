@@ -1,14 +1,19 @@
 """The mass of a character by the volume of its skin."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.contact_editing import add_bone_contacts, add_object_contacts
+from softground_addon.blender.characters.import_fixes import has_legs
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.setup.character_editing import suggested_mass
 from tests.blender import shots
 from tests.blender.baking.test_self_check import codes
+from tests.blender.characters.random_animals import Animal, make
 from tests.blender.characters.test_recognition import box
 from tests.blender.grounds import bake
 
@@ -157,3 +162,31 @@ def test_what_prints_beside_the_feet_leaves_the_skin_as_heavy_as_it_is(scene, wh
     bpy.context.view_layer.update()
     (motion,) = analysis.read(scene).shot.motions
     assert motion.skin.mass == pytest.approx(character.skin_mass, rel=1e-3)
+
+
+def test_joints_put_right_leave_the_skin_as_heavy_as_it_is(scene):
+    shots.walker(scene, frames=30)
+    character = added(scene)
+    for side in "lr":
+        character.joints[f"ankle_{side}"].bone = f"toe.{side.upper()}"
+        character.joints[f"hip_{side}"].bone = f"shoulder.{side.upper()}"
+    (motion,) = analysis.read(scene).shot.motions
+    assert motion.skin.mass == pytest.approx(character.skin_mass, rel=1e-3)
+
+
+def test_an_animal_whose_front_legs_have_no_names_is_no_person(scene):
+    animal = replace(Animal.drawn(3), legs=4, names="half", foot="chain", unit=1.0, size=1.0)
+    character = add_character(scene, make(animal)[0])
+    assert len(character.soles) == 4
+    assert {"hip_l", "knee_l", "ankle_l"} <= {*character.joints.keys()}
+    assert not has_legs(character)
+
+
+def test_shoes_on_a_body_of_curves_do_not_tell_its_mass(scene):
+    armature = shots.walker(scene, frames=30)
+    bpy.data.objects.remove(armature.children[0])
+    for side in "LR":
+        mesh_on(armature, "Shoe", *cylinder(0.05, 0.0, 0.1), f"foot.{side}", hung=True)
+    character = added(scene)
+    assert character.skin_mass == 0
+    assert character.mass == pytest.approx(77.5)

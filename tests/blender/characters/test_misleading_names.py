@@ -52,6 +52,17 @@ def recognised(scene, names, *, has_skin=True):
         pytest.param(swapped(("foot.L", "foot.R")), id="left and right feet"),
         pytest.param(swapped(*((f"thigh.{side}", f"foot.{side}") for side in SIDES)), id="thighs and feet"),
         pytest.param(swapped(*((f"shin.{side}", f"toe.{side}") for side in SIDES)), id="shins and toes"),
+        pytest.param(
+            {
+                f"{bone}.{side}": f"{name}.{side}"
+                for side in SIDES
+                for bone, name in (
+                    *(("upper_arm", "thigh"), ("forearm", "shin")),
+                    *((bone, f"Bone {bone[:2]}") for bone in ("thigh", "shin", "foot", "toe", "hand")),
+                )
+            },
+            id="arms are legs without feet",
+        ),
         *(pytest.param(seed, id=f"shuffled {seed}") for seed in range(6)),
     ],
 )

@@ -3,10 +3,14 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.jobs import run
+from softground_addon.blender.reading import staleness
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
+from softground_addon.blender.sampling.skin_sampling import read_skin
+from softground_addon.blender.settings import character_of
 from tests.blender import rigs
 
 STRIDE, FRAMES = 0.8, 97
@@ -70,6 +74,44 @@ def test_a_foot_on_several_bones_is_one_contact(scene, foot):
     carriers = {f"{bone}.{side}" for bone in ("Leg3", "Foot") for side in "LR"}
     skinned = carriers if foot == "split" else {f"Leg3.{side}" for side in "LR"}
     assert {part for sole in character.soles for part, _ in sole.parts.items()} == skinned
+
+
+@pytest.mark.parametrize("how", ["BONE", "CHILD_OF", "ARMATURE", "COPY_TRANSFORMS"])
+def test_what_follows_a_bone_by_a_constraint_is_skin_as_what_hangs_on_it(scene, how):
+    """As shoes, or the rigid parts of a robot."""
+    armature = robot("one")
+    deformed = read_skin(scene.objects, armature)
+    for leg in [obj for obj in scene.objects if obj.name.startswith("leg")]:
+        bone = armature.data.bones[leg.vertex_groups[0].name]
+        leg.modifiers.clear()
+        leg.vertex_groups.clear()
+        leg.parent = None
+        if how == "BONE":
+            leg.parent, leg.parent_type, leg.parent_bone = armature, "BONE", bone.name
+            tail = bone.matrix_local @ Matrix.Translation((0, bone.length, 0))
+            leg.matrix_parent_inverse = tail.inverted()
+            continue
+        constraint = leg.constraints.new(how)
+        target = constraint.targets.new() if how == "ARMATURE" else constraint
+        target.target, target.subtarget = armature, bone.name
+        if how == "CHILD_OF":
+            constraint.inverse_matrix = bone.matrix_local.inverted()
+        elif how == "COPY_TRANSFORMS":
+            leg.data.transform(bone.matrix_local.inverted())
+    carried = read_skin(scene.objects, armature)
+    assert carried.bones == deformed.bones
+    assert carried.part.tolist() == deformed.part.tolist()
+    assert carried.vertices == pytest.approx(deformed.vertices, abs=1e-6)
+    character = add_character(scene, armature)
+    assert {part for sole in character.soles for part, _ in sole.parts.items()} == {"Leg3.L", "Leg3.R"}
+    wanted = character_of(character)
+    before = staleness._of_body(scene.objects, wanted)
+    leg = bpy.data.objects["leg"]
+    if how == "CHILD_OF":
+        leg.constraints[0].inverse_matrix.translation.x += 0.1
+    else:
+        leg.data.vertices[0].co.x += 0.1
+    assert staleness._of_body(scene.objects, wanted) != before
 
 
 LEGS = {

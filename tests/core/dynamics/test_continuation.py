@@ -84,7 +84,32 @@ def test_a_body_that_lands_or_pushes_off_at_the_end_of_a_take_does_not_ease(seco
         feet = [flat_sole(np.stack([0 * left, 0 * left + side, falls], axis=1)[order]) for side in (-0.1, 0.1)]
         above = {name: np.add(hips, (0, 0, up)) for name, up in {"chest": 0.4, "head": 0.7}.items()}
         motion = character(feet, rate=100.0, hips=hips, **above)
-        assert not _eased(motion).any(), rest
+        assert not _eased(motion, np.arange(100.0)).any(), rest
+
+
+def bobbing(times):
+    """A body that walks, at some times in frames."""
+    time = np.asarray(times) / RATE
+    phase = 2 * np.pi * time
+    hips = np.stack([time, 0.02 * np.sin(phase), 0.9 + 0.03 * np.cos(2 * phase)], axis=1)
+    feet = [
+        flat_sole(np.stack([time + 0.2 * np.sin(phase + side), 0 * time, 0 * time], axis=1)) for side in (0.0, np.pi)
+    ]
+    return character(feet, rate=RATE, hips=hips)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.4, 0.5, 0.9])
+def test_keys_that_begin_and_end_within_a_frame_are_cut_and_not_held(part):
+    times = np.arange(49.0)
+    held = replace(bobbing(times.clip(part, 48 - part)), animated=(1.0 + part, 49.0 - part))
+    smooth, walk = without_holds(held), bobbing(times)
+    assert smooth.joints["hips"] == pytest.approx(walk.joints["hips"], abs=4e-3)
+    for sole, true in zip(smooth.soles, walk.soles, strict=True):
+        assert sole.transforms == pytest.approx(true.transforms, abs=1e-2)
+    whole = replace(bobbing(times), animated=(1.0, 49.0))
+    assert without_holds(whole) is whole
+    longer = replace(bobbing(times.clip(8.5, 40.5)), animated=(9.5, 41.5))
+    assert without_holds(longer) is longer, "a pose that stays is a rest"
 
 
 def test_a_rest_is_no_hold():
