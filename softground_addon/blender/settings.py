@@ -295,6 +295,7 @@ def character_of(character: Any) -> CharacterSettings:
         ),
         body=name_of(character.body) if character.body and not armature else None,
         dirty_soles=character.dirty_soles,
+        dirty_with="" if character.dirty_with == "GROUND" else character.dirty_with.lower(),
     )
 
 

@@ -123,16 +123,16 @@ def _earth(
     uneven = graph.swing(place, 0.012, 3.0) * 0.5
     look: Any = surface.colour
     shade = PAINT_SHADE
-    if isinstance(surface, SurfaceRecord):  # as the ground, half trodden where it lies thick
-        dark, light, trodden = surface.tones
-        look = graph.mix(solid * 0.5, graph.mix(graph.ramp(uneven, -0.1, 0.1), dark, light), trodden)
+    if isinstance(surface, SurfaceRecord):  # as the ground, trodden where it lies thick
+        dark, light, trodden = surface.tones or (surface.colour,) * 3
+        look = graph.mix(solid * 0.4, graph.mix(graph.ramp(uneven, -0.1, 0.1), dark, light), trodden)
         shade = weather.PALE
     colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), graph.times(look, shade), look)
     clods = CLODS if isinstance(surface, SurfaceRecord) else 0.02 * CLODS
     height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * clods)
     inputs = {
         "Base Color": colour,
-        "Roughness": graph.blend(wet, 0.92, 0.34) + uneven * 0.3,
+        "Roughness": graph.blend(wet, 0.92, 0.42) + uneven * 0.3,
         "Alpha": alpha,
     }
     return graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs)), height
