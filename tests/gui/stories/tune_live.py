@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Euler
 
 from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
@@ -60,7 +59,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     with_viewport(hand, bpy.ops.softground.overlay)
     facts["overlay"] = bpy.context.window_manager.softground.show_overlay
     scene().frame_set(58)
-    yield from look_at_feet(hand, tilt=1.05, distance=2.0)
+    yield from hand.look_at_walk()
     yield from hand.picture("live")
     scene().frame_set(96)
     yield 0.5
@@ -68,7 +67,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["kept"] = "softground_record" in scene().softground.ground.data
     facts["no longer live"] = not bpy.context.window_manager.softground.is_live
     scene().frame_set(59)
-    yield from look_at_feet(hand, tilt=0.75, distance=3.0)
+    yield from hand.look_at_walk()
     yield 1.0  # the overlay has the animation read as it is drawn
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield 1.5  # panels glide to their places
@@ -104,21 +103,6 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["disabled: no handlers"] = not [
         handler for handler in bpy.app.handlers.frame_change_post if "softground" in handler.__module__
     ]
-
-
-def look_at_feet(hand: Hand, tilt: float, distance: float) -> Steps:
-    """Look at the feet and the prints behind and before them, in the docs in the light of a low sun."""
-    yield from hand.look_at_walk()
-    space, place = hand.area().spaces.active, scene().objects["Walker"].pose.bones["hips"].matrix.translation
-    view = space.region_3d
-    view.view_location, view.view_distance = (place.x, place.y, 0.1), distance
-    view.view_rotation = Euler((tilt, 0.0, 0.9)).to_quaternion()
-    if hand.for_docs and space.shading.type != "MATERIAL":
-        over = space.overlay
-        over.show_outline_selected = over.show_floor = over.show_axis_x = over.show_axis_y = over.show_bones = False
-        hand.show_materials((0.3, 4.4))
-        yield 25.0  # until its shaders are there
-    yield 0.7
 
 
 def scene():
