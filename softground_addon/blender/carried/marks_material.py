@@ -125,7 +125,7 @@ def _earth(
     shade = PAINT_SHADE
     if isinstance(surface, SurfaceRecord):  # as the ground, trodden where it lies thick
         dark, light, trodden = surface.tones or (surface.colour,) * 3
-        look = graph.mix(solid * 0.4, graph.mix(graph.ramp(uneven, -0.1, 0.1), dark, light), trodden)
+        look = graph.mix(solid * 0.5, graph.mix(graph.ramp(uneven, -0.1, 0.1), dark, light), trodden)
         shade = weather.PALE
     colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), graph.times(look, shade), look)
     clods = CLODS if isinstance(surface, SurfaceRecord) else 0.02 * CLODS

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...core.ground.surfaces import SURFACES
 from ..nodes.shader_graph import Graph, Socket
 from ..playback.own_data import WATER
 
@@ -34,6 +33,8 @@ class Ground:
         Height of the bars that the tread of a shoe left in the print [m].
     normal : Socket
         Unit normal of the smooth ground, with the swells of open ground.
+    tones : tuple of colours
+        Of its surface's record.
     """
 
     place: Socket
@@ -42,6 +43,7 @@ class Ground:
     risen: Socket
     tread: Socket
     normal: Socket
+    tones: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def edge(self) -> Socket:
@@ -133,7 +135,7 @@ def dry_sand(graph: Graph, ground: Ground) -> Look:
 def wet_sand(graph: Graph, ground: Ground) -> Look:
     """Dark and firm; the rims dry first, and the hollows hold the water that shines."""
     relief, tint = _grains(graph, ground)
-    dark, light, trodden = SURFACES["wet_sand"].tones
+    dark, light, trodden = ground.tones
     colour = graph.mix(graph.ramp(tint, 0.0, 1.0), dark, light)
     colour = graph.mix(ground.risen * 0.6, colour, (0.42, 0.29, 0.16))
     colour = graph.mix(ground.pressed * 0.5, colour, trodden)
@@ -161,7 +163,7 @@ def mud(graph: Graph, ground: Ground) -> Look:
     relief = (relief + squeezed * 0.008 + ground.tread) * dry
     damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
     wet = graph.math("MAXIMUM", ground.pressed, damp)
-    dark, light, trodden = SURFACES["mud"].tones
+    dark, light, trodden = ground.tones
     colour = graph.mix(graph.ramp(lumps, -0.2, 0.2), dark, light)
     colour = graph.mix(wet, colour, trodden)
     colour = graph.mix(water * 0.93, colour, (0.150, 0.100, 0.060))
