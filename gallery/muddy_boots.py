@@ -25,7 +25,7 @@ PRESET = "Mud"
 FRAMES, SHOWN = 120, 116
 RISE, STAIRS, FIRST = 0.12, 4, 5
 """Height of each stair [m], how many there are, and the footfall that is on the first."""
-CAMERA = (1.25, 1.85, 1.35), (-0.02, -1.25, 0.1), 32.0
+CAMERA = (0.5, 1.35, 0.86), (-0.1, -0.8, 0.0), 34.0
 """Where it is and looks [m], and its lens [mm]."""
 
 
@@ -58,7 +58,7 @@ def claims(built: Built) -> list[Claim]:
 def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """Floor and stair from behind, and one mark from above."""
     scene = bpy.context.scene
-    open_air.add_low_sun(scene, radians(-150), radians(24), (1.0, 0.93, 0.84), 4.0, 0.35, open_air.PALE_DUSK)
+    open_air.add_low_sun(scene, radians(-150), radians(28), (1.0, 0.93, 0.84), 3.8, 0.2, open_air.DAY)
     scene.frame_set(SHOWN)
     hiker = bpy.data.objects["Hiker"]
     outfit.wear_boots(hiker, Body())

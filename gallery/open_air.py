@@ -131,6 +131,8 @@ _OZONE = 3.0
 """Of the sky, in that of a clear day: what turns dusk blue overhead."""
 PALE_DUSK = (radians(4.5), 2.4)
 """Sun and ozone of a sky that is pale at the horizon, where a lower sun makes it mustard."""
+DAY = (radians(14.0), 1.0)
+"""Those of a sky by day, in which stone and what lies on it keep their colours."""
 
 
 def add_low_sun(

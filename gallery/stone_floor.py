@@ -26,8 +26,9 @@ _HILLS = open_air.rolling(swell=0.12, hills=8.0, seed=4)
 
 def height(x: Array, y: Array) -> Array:
     """Soft ground before the floor, and lower below it [m]."""
-    under = np.clip((EDGE - 0.02 - y) / 0.05, 0.0, 1.0) * (np.abs(x) < HALF_WIDTH)
-    return _HILLS(x, y) * (np.abs(x) > HALF_WIDTH) - BELOW * under
+    beside = (np.abs(x) > HALF_WIDTH) | (y < END)
+    under = np.clip((EDGE - 0.02 - y) / 0.05, 0.0, 1.0) * ~beside
+    return _HILLS(x, y) * beside - BELOW * under
 
 
 def crossed(

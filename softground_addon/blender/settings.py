@@ -289,6 +289,7 @@ def character_of(character: Any) -> CharacterSettings:
         ),
         body=name_of(character.body) if character.body and not armature else None,
         dirty_soles=character.dirty_soles,
+        dirty_with="" if character.dirty_with == "GROUND" else character.dirty_with.lower(),
         added_as=character.name if armature and character.name != armature.name else "",
     )
 

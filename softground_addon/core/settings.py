@@ -76,8 +76,9 @@ class CharacterSettings:
     body : ObjectName or None
         The mesh that moves its own parts, or the empty above rigid ones, of a body without an armature; the bones of
         its soles are parts of it.
-    dirty_soles : float
-        Film on its soles as the shot starts, over the thickest that they carry.
+    dirty_soles, dirty_with : float, str
+        Film on its soles as the shot starts, over the thickest that they carry, and its surface or liquid: that of the
+        ground if empty.
     added_as : str
         Name of its rig as it was added; empty if it still is called so.
     """
@@ -93,6 +94,7 @@ class CharacterSettings:
     holds: tuple[foot_holds.FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
     body: ObjectName | None = field(default=None, metadata={"said_if_on": True})
     dirty_soles: float = field(default=0.0, metadata={"said_if_on": True, **_on(Acts.RESPONDING)})
+    dirty_with: str = field(default="", metadata={"said_if_on": True, **_on(Acts.RESPONDING)})
     added_as: str = field(default="", metadata={"said_if_on": True, **_on(Acts.OUTPUT)})
 
 

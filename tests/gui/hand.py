@@ -95,13 +95,14 @@ class Hand:
             yield 0.1
             waited += 0.1
 
-    def picture(self, name: str, *, of: str = "", in_docs: bool = True) -> Steps:
-        """Keep what the window shows, or one region of the viewport."""
+    def picture(self, name: str, *, of: str = "", is_high: bool = False, in_docs: bool = True) -> Steps:
+        """Keep what the window shows, or one region of the viewport; as high as the window where a menu hangs out."""
         yield 0.5
         place = f"{self.window.width}x{self.window.height}+0+0"
         if of:
             region = self.region(of)
-            place = f"{region.width}x{region.height}+{region.x}+{region.y}"
+            height, below = (self.window.height, 0) if is_high else (region.height, region.y)
+            place = f"{region.width}x{height}+{region.x}+{below}"
         crop = ["-gravity", "SouthWest", "-crop", place, "+repage"]
         folder = self.pictures / "docs" if in_docs else self.pictures
         folder.mkdir(exist_ok=True)

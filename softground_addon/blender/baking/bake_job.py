@@ -239,7 +239,7 @@ def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[t
         *bake_report.hidden_skins(scene.objects, wanted, shot.motions),
         *bake_report.shapes_left_out(scene.objects, wanted),
     ]
-    moving += bake_report.unlisted_findings(scene.softground)
+    moving += bake_report.unlisted_findings(scene.softground, wanted)
     return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
 
 

@@ -151,8 +151,9 @@ def unlisted(options: Any) -> list[bpy.types.Object]:
     ]
 
 
-def unlisted_findings(options: Any) -> list[Finding]:
-    """Findings about the `unlisted` grounds of a scene."""
+def unlisted_findings(options: Any, wanted: BakeSettings) -> list[Finding]:
+    """Findings about the `unlisted` grounds of a scene, without those on which other characters alone have walked."""
+    present = {character.added_as or character.name for character in wanted.characters}
     return [
         Finding(
             "unlisted_prints",
@@ -161,6 +162,7 @@ def unlisted_findings(options: Any) -> list[Finding]:
             "Clear them, or list it again, in the Ground panel.",
         )
         for ground in unlisted(options)
+        if not (its := _shot_on(ground).characters) or not present.isdisjoint(its.values())
     ]
 
 

@@ -96,7 +96,7 @@ def marks_of_record(
     loads: Sequence[CharacterLoads],
     debris: Debris | None,
     *,
-    brought: Mapping[str, float],
+    brought: Mapping[str, tuple[str, float]],
 ) -> Slices[Marks | None]:
     """The marks on hard floors, if asked for; see `core.carried.marks.marks_of`."""
     if not made_with.marks:

@@ -185,7 +185,7 @@ def _of_ground(
     record = yield from meanwhile(at_end, carving)
     throwing = with_debris.slices(record, ground, made_with, loads)
     record, debris = yield from meanwhile(at_end, throwing)
-    brought = {character.name: character.dirty_soles for character in made_with.characters}
+    brought = {each.name: (each.dirty_with or made_with.surface, each.dirty_soles) for each in made_with.characters}
     has_the_rest = number == first_with_steps([each.footprints for each in pressed.records])
     if not has_the_rest and isinstance(terrain, HardOnSoft):
         terrain, brought = replace(terrain, wet={}), {}

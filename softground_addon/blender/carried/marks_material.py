@@ -9,6 +9,7 @@ import bpy
 from ...core.carried.ageing import AgedMark, aged
 from ...core.ground.surfaces import Liquid, SurfaceRecord
 from ...core.relief.tread import LENGTH, PADS
+from ...core.weather import weather
 from ..compat import shader_tree
 from ..nodes.shader_graph import Graph, Socket
 from . import marks_nodes as nodes
@@ -21,9 +22,10 @@ WARP = 0.012
 """How far lumps bend the edges of lugs, over the size of the noise [m]."""
 SMEAR = 0.4
 """How much of the floor a smear between lumps covers."""
-DRY_SHADE = 2.6
-"""How much paler mud is when it is dry."""
-PAINT_SHADE = 0.55
+WAIST, ARCH = (0.1, 0.3, 0.75, 0.95), 0.5
+"""Between the zones of heel and arch, 0 and 1: where a shoe bears no more, not at all, not yet, and again; and how
+much of the film the arch leaves."""
+PAINT_SHADE = (0.55, 0.55, 0.55)
 """How much darker paint and blood are when they are dry."""
 CLODS = 3e-3
 """Height of clods where a mark is thickest [m]."""
@@ -80,11 +82,15 @@ def _amount(graph: Graph, surface: SurfaceRecord | Liquid, mass: Socket) -> tupl
     groove = graph.math("ABSOLUTE", phase + -0.5, 0.0)
     is_shod = graph.math("GREATER_THAN", graph.attribute(nodes.TREAD), 0.0)
     lug = graph.blend(is_shod, 0.8, graph.ramp(groove, *GROOVES, 1.0, 0.25))
-    full = mass * (1.0 / (COVERED * surface.carried.most))
-    patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.55, 1.3)
+    zone = graph.attribute(nodes.ZONE) + coarse * 0.3
+    waist = graph.ramp(zone, *WAIST[:2], 1.0, 0.0) + graph.ramp(zone, *WAIST[2:])
+    arch = graph.ramp(zone, *WAIST[2:], 1.0, ARCH) + graph.ramp(zone, 1.0, 1.5, 0.0, 1.0 - ARCH)
+    full = mass * (1.0 / (COVERED * surface.carried.most)) * graph.blend(is_shod, 1.0, arch)
+    patches = graph.ramp(graph.noise(place, 0.07, 2.0), 0.3, 0.7, 0.7, 1.25)
     amount = full * lug * patches + (coarse * 1.7 + fine * 0.9) * graph.ramp(full, 0.0, 0.5)
     ragged = distance + coarse * 0.010 + fine * 0.004
     edge = graph.ramp(ragged, -0.004, 0.001, 1.0, 0.0)
+    edge = edge * graph.blend(is_shod, 1.0, waist)
     return amount, edge * _pads(graph, coarse * 0.006 + fine * 0.003)
 
 
@@ -114,15 +120,19 @@ def _earth(
     solid = graph.ramp(graph.math("SUBTRACT", amount, flaked), 0.18, 0.45) * edge
     smeared = graph.ramp(graph.math("SUBTRACT", amount, flaked), -0.25, 0.4) * edge * SMEAR
     alpha = graph.math("MAXIMUM", solid, smeared)
-    shade = PAINT_SHADE if surface.name == "paint" else DRY_SHADE
-    pale: Any = tuple(min(1.0, part * shade) for part in surface.colour)
     uneven = graph.swing(place, 0.012, 3.0) * 0.5
-    colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), pale, surface.colour)
+    look: Any = surface.colour
+    shade = PAINT_SHADE
+    if isinstance(surface, SurfaceRecord):  # as the ground, trodden where it lies thick
+        dark, light, trodden = surface.tones or (surface.colour,) * 3
+        look = graph.mix(solid * 0.5, graph.mix(graph.ramp(uneven, -0.1, 0.1), dark, light), trodden)
+        shade = weather.PALE
+    colour = graph.mix(graph.math("MAXIMUM", wet + uneven, 0.0), graph.times(look, shade), look)
     clods = CLODS if isinstance(surface, SurfaceRecord) else 0.02 * CLODS
     height = solid * graph.ramp(amount, 0.1, 1.6) * (graph.noise(place, 0.009, 4.0, 0.6) * clods)
     inputs = {
         "Base Color": colour,
-        "Roughness": graph.blend(wet, 0.92, 0.34) + uneven * 0.3,
+        "Roughness": graph.blend(wet, 0.92, 0.42) + uneven * 0.3,
         "Alpha": alpha,
     }
     return graph.out(graph.node("ShaderNodeBsdfPrincipled", inputs)), height

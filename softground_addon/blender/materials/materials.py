@@ -127,6 +127,7 @@ def shaded(graph: Graph, surface: SurfaceRecord, ground: Ground, *, is_open: boo
 def _look(graph: Graph, surface: SurfaceRecord, ground: Ground, *, is_open: bool) -> tuple[Any, Socket]:
     """Shader inputs and relief [m] of a surface under weather."""
     build: Callable[[Graph, Ground], Look] = getattr(surface_shaders, surface.shader)
+    ground = replace(ground, tones=surface.tones)
     if not is_open:
         look = build(graph, ground)
         return under_weather(graph, surface, _with_under(graph, surface, look.inputs), look.relief)

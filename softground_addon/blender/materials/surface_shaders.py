@@ -33,6 +33,8 @@ class Ground:
         Height of the bars that the tread of a shoe left in the print [m].
     normal : Socket
         Unit normal of the smooth ground, with the swells of open ground.
+    tones : tuple of colours
+        Of its surface's record.
     """
 
     place: Socket
@@ -41,6 +43,7 @@ class Ground:
     risen: Socket
     tread: Socket
     normal: Socket
+    tones: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def edge(self) -> Socket:
@@ -132,9 +135,10 @@ def dry_sand(graph: Graph, ground: Ground) -> Look:
 def wet_sand(graph: Graph, ground: Ground) -> Look:
     """Dark and firm; the rims dry first, and the hollows hold the water that shines."""
     relief, tint = _grains(graph, ground)
-    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.16, 0.095, 0.045), (0.30, 0.20, 0.115))
+    dark, light, trodden = ground.tones
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), dark, light)
     colour = graph.mix(ground.risen * 0.6, colour, (0.42, 0.29, 0.16))
-    colour = graph.mix(ground.pressed * 0.5, colour, (0.12, 0.072, 0.036))
+    colour = graph.mix(ground.pressed * 0.5, colour, trodden)
     return Look(
         relief,
         {
@@ -159,8 +163,9 @@ def mud(graph: Graph, ground: Ground) -> Look:
     relief = (relief + squeezed * 0.008 + ground.tread) * dry
     damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
     wet = graph.math("MAXIMUM", ground.pressed, damp)
-    colour = graph.mix(graph.ramp(lumps, -0.2, 0.2), (0.128, 0.076, 0.041), (0.205, 0.130, 0.076))
-    colour = graph.mix(wet, colour, (0.080, 0.045, 0.023))
+    dark, light, trodden = ground.tones
+    colour = graph.mix(graph.ramp(lumps, -0.2, 0.2), dark, light)
+    colour = graph.mix(wet, colour, trodden)
     colour = graph.mix(water * 0.93, colour, (0.150, 0.100, 0.060))
     level = graph.node("ShaderNodeMix", {"Factor_Float": water, "A_Vector": ground.normal, "B_Vector": UP}, **_VECTOR)
     return Look(

@@ -9,15 +9,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...core.ground.surfaces import SurfaceRecord
+from ...core.weather import weather
 from ..nodes.shader_graph import Graph, Socket
 from ..playback.weather_nodes import BLOWN, DRIED, FRESH, WATER, WETNESS
 from .ground_place import ground_place
 
 NEW_SNOW = (0.915, 0.935, 0.96)
-SOAKED = (0.42, 0.38, 0.34)
-"""What is left of a dry ground's colour when it is wet (Lekner and Dorf 1988, doi:10.1364/AO.27.001278: about half)."""
-PALE = (1.0 / SOAKED[0], 1.0 / SOAKED[1], 1.0 / SOAKED[2])
-"""Wet ground's colour when it is dry, over what it was."""
 PATCH = 0.4
 """Size of the largest patches in which wet ground dries, of five octaves [m]."""
 DULL = 0.2
@@ -52,14 +49,14 @@ def _wet(graph: Graph, surface: SurfaceRecord, shown: dict[str, Any], relief: So
         late = graph.ramp(graph.noise(ground_place(graph), PATCH, 5.0, 0.6), 0.35, 0.65)
         # Water never lies even: some of it is pale while the rest is still dark. Wet and dry all of it is.
         dried = graph.ramp(graph.attribute(DRIED) * 2.0 + late * -1.0, 0.0, 1.0)
-        pale = _times(graph, colour, PALE)
+        pale = graph.times(colour, weather.PALE)
         shown["Roughness"] = graph.blend(dried, shown["Roughness"], 0.95)
         shown["Specular IOR Level"] = graph.blend(dried, shown.get("Specular IOR Level", 0.5), DULL)
         if "Coat Weight" in shown:
             shown["Coat Weight"] = shown["Coat Weight"] * graph.math("SUBTRACT", 1.0, dried)
         return graph.mix(dried, colour, pale), relief
     wet, water = graph.attribute(WETNESS), graph.ramp(graph.attribute(WATER), 0.0, FULL)
-    dark = _times(graph, colour, SOAKED)
+    dark = graph.times(colour, weather.SOAKED)
     # Water films shine in patches only: where all is glossy, a low sun makes concrete of it.
     film = graph.ramp(graph.noise(ground_place(graph), FILM, 3.0), 0.45, 0.80)
     gloss = graph.blend(wet, shown["Roughness"], graph.blend(film, 0.75, 0.50))
@@ -67,9 +64,3 @@ def _wet(graph: Graph, surface: SurfaceRecord, shown: dict[str, Any], relief: So
     mirror = graph.blend(wet, shown.get("Specular IOR Level", 0.5), graph.blend(film, 0.20, 0.4))
     shown["Specular IOR Level"] = graph.blend(water, mirror, 0.5)
     return graph.mix(wet, colour, dark), relief * graph.math("SUBTRACT", 1.0, water)
-
-
-def _times(graph: Graph, colour: Socket, factor: tuple[float, float, float]) -> Socket:
-    """A colour times another."""
-    inputs = {"Factor_Float": 1.0, "A_Color": colour, "B_Color": (*factor, 1.0)}
-    return graph.out(graph.node("ShaderNodeMix", inputs, data_type="RGBA", blend_type="MULTIPLY"), 2)

@@ -98,6 +98,11 @@ class Graph:
         inputs = {"Factor_Float": factor, "A_Color": _rgba(a), "B_Color": _rgba(b)}
         return self.out(self.node("ShaderNodeMix", inputs, data_type="RGBA"), 2)
 
+    def times(self, a: Socket | Colour, b: Colour) -> Socket:
+        """A colour times another."""
+        inputs = {"Factor_Float": 1.0, "A_Color": _rgba(a), "B_Color": _rgba(b)}
+        return self.out(self.node("ShaderNodeMix", inputs, data_type="RGBA", blend_type="MULTIPLY"), 2)
+
     def blend(self, factor: Socket, a: Socket | float, b: Socket | float) -> Socket:
         """Number a at factor 0, b at factor 1."""
         return self.out(self.node("ShaderNodeMix", {"Factor_Float": factor, "A_Float": a, "B_Float": b}))

@@ -159,7 +159,8 @@ class SOFTGROUND_PT_of_character(CharacterPanel, bpy.types.Panel):
         options, obj = settings.options_of(context), context.object
         character = active_character(options)
         if belongs_to(character, obj):
-            for field in ("mass", "dirty_soles", "force_model"):
+            dirt = ("dirty_with",) if character.dirty_soles else ()
+            for field in ("mass", "dirty_soles", *dirt, "force_model"):
                 layout.prop(character, field)
             return
         number, other = next(found for found in enumerate(options.characters) if belongs_to(found[1], obj))

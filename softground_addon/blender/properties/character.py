@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
+from ...core.ground import surfaces
 from .. import settings
 from ..animation_layer.constraint_layer import LayerKind, set_strength
 from ..translation import CONTEXT
@@ -142,7 +143,19 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     )
     dirty_soles: share(
         "Dirty Soles",
-        "How much of the ground's snow, mud or wet sand is on its soles as the shot starts: 1 is all that they carry",
+        "How much is on its soles as the shot starts: 1 is all that they carry",
+    )
+    dirty_with: EnumProperty(
+        name="Dirty With",
+        description="What is on its soles as the shot starts",
+        items=[
+            ("GROUND", "Ground", "What the ground is made of"),
+            *(
+                (of.name.upper(), of.label, "")
+                for of in (*surfaces.SURFACES.values(), *surfaces.LIQUIDS.values())
+                if of.carried
+            ),
+        ],
     )
     size: FloatProperty(
         name="Size", description="Size of the rig, which shows whether its scale is wrong", options={"HIDDEN"}

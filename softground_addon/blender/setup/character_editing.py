@@ -110,7 +110,7 @@ class SOFTGROUND_OT_walk_ahead(_OnCharacter, Reading):
         known = yield from analysis.reading(scene)
         belt = known.belts.get(name)
         if belt is None or rig is None:
-            raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
+            raise InputError(f"'{name}' does not walk on the spot: its feet rest, or no speed lets all of them rest.")
         import_fixes.walk_ahead(scene, settings.resolve(rig), -belt)
         return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 

@@ -154,7 +154,7 @@ def marks_of(
     treads: Mapping[tuple[str, str], float] = MappingProxyType({}),
     bare: Collection[tuple[str, str]] = (),
     carried: tuple[float, float] = (1.0, 1.0),
-    brought: Mapping[str, float] = MappingProxyType({}),
+    brought: Mapping[str, tuple[str, float]] = MappingProxyType({}),
 ) -> Slices[Marks | None]:
     """What soles leave on the hard floors of a shot; None where there is none, or nothing sticks.
 
@@ -174,13 +174,15 @@ def marks_of(
         Feet without shoes, whose toes show.
     carried : (float, float), optional
         How much sticks and how far it goes, as of `CarriedFilm.scaled`.
-    brought : mapping of str to float, optional
-        Film of `surface` on the soles of a character as the shot starts, over the thickest, by its name.
+    brought : mapping of str to (str, float), optional
+        What is on the soles of a character as the shot starts, and its film over the thickest, by its name.
     """
     if not isinstance(terrain, HardOnSoft):
         return None
     prints = [step.footprint or step.baked for step in steps]
-    kinds = dict.fromkeys([surface, *(footprint.surface for footprint in prints if footprint.surface), *terrain.wet])
+    dirt = [kind for kind, film in brought.values() if film]
+    of_prints = [footprint.surface for footprint in prints if footprint.surface]
+    kinds = dict.fromkeys([surface, *of_prints, *terrain.wet, *dirt])
     sticking = [kind for kind in map(surfaces.sticking, kinds) if kind.carried is not None]
     if not sticking:
         return None
@@ -189,7 +191,7 @@ def marks_of(
         for index, motion in enumerate(character.motion.soles):
             yield
             of, hard = (character.motion.name, motion.sole.name), character.contacts.hard
-            dirty = brought.get(of[0], 0.0)
+            _, dirty = brought.get(of[0], ("", 0.0))
             on_soft = any((step.baked.character, step.baked.sole) == of for step in steps)
             takes = on_soft or dirty or terrain.wet
             if not takes or hard is None or not hard[:, index].any():
@@ -204,7 +206,9 @@ def marks_of(
                 areas = np.max([_by_zone(each.grid, each.grid.area) for each in contacts], axis=0)
                 sole = SoleOnFloors(of, areas, float(character.motion.frames[-1]), dirty, (), ())
                 laid_out.append((contacts, sole, _Under(treads.get(of, 0.0), motion.sole if of in bare else None)))
-    whole = [_of_kind(kind, FloorSteps(kind.name, surface, (), carried), laid_out, steps, shed) for kind in sticking]
+    whole = [
+        _of_kind(kind, FloorSteps(kind.name, surface, (), carried), laid_out, steps, shed, brought) for kind in sticking
+    ]
     return max(whole, key=lambda marks: (marks.carried.left_behind, len(marks.faces)))
 
 
@@ -214,6 +218,7 @@ def _of_kind(
     laid_out: Sequence[tuple[Sequence[_Contact], SoleOnFloors, _Under]],
     steps: Sequence[EditableStep],
     shed: Mapping[int, float],
+    brought: Mapping[str, tuple[str, float]],
 ) -> Marks:
     """All marks of one kind, and those that there would be if steps on soft ground are muted no more, or shifted."""
     parts: list[_Mark] = []
@@ -227,7 +232,7 @@ def _of_kind(
             meetings.append(Meeting(float(contact.frames[-1 if is_wet else 0]), None if is_wet else of_zones))
             marks.append(-1 if is_wet else len(parts))
             parts += [] if is_wet else [_mark(contact, share, under)]
-        dirty = sole.dirty if kind.name == floors.ground else 0.0
+        dirty = sole.dirty if sole.of[0] in brought and brought[sole.of[0]][0] == kind.name else 0.0
         soles.append(replace(sole, meetings=tuple(meetings), marks=tuple(marks), dirty=dirty))
     floors = replace(floors, soles=tuple(soles))
     baked = [replace(step, footprint=step.baked) for step in steps if not step.is_copy]

@@ -46,14 +46,12 @@ class ThrownMatter:
         what its yield stress holds against the swing: of mud 200 Pa/(1700 kg/m³·30 m/s²), 4 mm; of wet sand, with a
         capillary cohesion of about 1 kPa, more than it carries. What hangs on loosely comes off: 5 to 15 g of a boot,
         by eye.
-    lumps : int
-        In how many lumps it comes off, which break as they do; 0 where it trickles.
-    sizes, settling : (float, float)
-        Smallest and largest diameter [m] (see `crumbs`), and the speeds at which these fall at last [m/s].
-    most : int
-        Pieces of a step in one phase at most: what is more is drawn as larger ones.
-    fine : float
-        Share of the volume in as many single grains, as a mist between the pieces.
+    lumps, sizes, settling : int, (float, float), (float, float)
+        In how many lumps it comes off, which break as they do, 0 where it trickles; smallest and largest diameter [m]
+        (see `crumbs`), and the speeds at which these fall at last [m/s].
+    most, fine : int, float
+        Pieces of a step in one phase at most: what is more is drawn as larger ones; and the share of the volume in as
+        many single grains, as a mist between the pieces.
     """
 
     repose: float
@@ -194,6 +192,8 @@ class SurfaceRecord:
         Of the loose matter [kg/m³]; sand is quartz of 2,650 with 40 % of pores.
     colour : (float, float, float)
         Of its pieces, and of the ground in Solid shading.
+    tones : tuple of (float, float, float)
+        Of wet ground, and of what soles carry of it: where it is dark and where it is light, and trodden.
     under : (float, float, float)
         Colour of what lies below it: earth, wet sand, grey sand without air, gravel, clay.
     shades, swell : (float, float), float
@@ -246,6 +246,7 @@ class SurfaceRecord:
     pales: bool = False
     control: str | None = None
     carried: CarriedFilm | None = None
+    tones: tuple[Triple, ...] = ()
 
     @property
     def label(self) -> str:
@@ -288,6 +289,7 @@ SURFACES = {record.name: record for record in (
         fragments=Fragments(0.012, 0.2, 2),
         voice=Voice(0.25, 0.7, 0.5, 0.15, (800, 3000), (0.001, 0.003), 200.0, 1.6, (600, 3500), (70, 120)),
         colour=(0.24, 0.16, 0.09), under=(0.09, 0.085, 0.08), shades=(0.74, 1.18), swell=0.14,
+        tones=((0.16, 0.095, 0.045), (0.30, 0.20, 0.115), (0.12, 0.072, 0.036)),
         shader="wet_sand", relief="wet_sand", midi_note=44,
         wall_packing=0.05, wall_cohesion=1000.0, wall_crumbling=0.03,
         soaking=Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0), wet=True, pales=True, control="moisture",
@@ -302,7 +304,8 @@ SURFACES = {record.name: record for record in (
             ((1, 0.9, 0.35), (1, 0.7, 0.45), (1, 0.85, 0.25), (1, 0.8, 0.6), (1, 0.45, 0.3), (1, 0.25, 0.2)),
         ),
         voice=Voice(0.3, 0.6, 0.5, 0.8, (250, 900), (0.004, 0.012), 60.0, 1.8, (150, 1200), (60, 100)),
-        colour=(0.10, 0.065, 0.04), under=(0.22, 0.20, 0.18), shades=(0.70, 1.25), swell=0.16,
+        colour=(0.108, 0.064, 0.035), under=(0.22, 0.20, 0.18), shades=(0.70, 1.25), swell=0.16,
+        tones=((0.128, 0.076, 0.041), (0.205, 0.130, 0.076), (0.080, 0.045, 0.023)),
         shader="mud", relief="mud", midi_note=48,
         wall_packing=0.0, wall_cohesion=2000.0,
         soaking=Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0), wet=True, control="soil_moisture",

@@ -56,6 +56,10 @@ HOP = 0.5
 """Part of a hop [m] by which blown grains spread: diffusivity 0.5·q/rho, by the pictures it gives."""
 SURFACE_FILM = 1e-3
 """Water that dries as fast as the air takes it [m]; water below comes up ever slower."""
+SOAKED = (0.42, 0.38, 0.34)
+"""What is left of a dry ground's colour when it is wet (Lekner and Dorf 1988, doi:10.1364/AO.27.001278: about half)."""
+PALE = (1.0 / SOAKED[0], 1.0 / SOAKED[1], 1.0 / SOAKED[2])
+"""Wet ground's colour when it is dry, over what it was."""
 DRY_AT = 3.0
 """Surface films lost until ground looks dry."""
 SHINE = 1e-3

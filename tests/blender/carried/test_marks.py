@@ -385,6 +385,20 @@ def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
     assert bake_report.stale_reasons(scene) == ()
 
 
+def test_soles_that_start_dirty_with_another_kind_leave_it_beside_sand_and_outdate_the_bake(scene):
+    character = scene.softground.characters[0]
+    scene.softground.material.surface, character.dirty_soles = "sand", 1.0  # which does not stick
+    assert "carried_kg" not in bake(scene).report["totals"]
+    character.dirty_with = "MUD"
+    assert bake_report.stale_reasons(scene) == ("The settings have changed",)
+    carried = bake(scene).report["totals"]["carried_kg"]
+    obj = marks_object.of(scene.softground.ground)
+    assert {value.value for value in obj.data.attributes["kind"].data} == {CARRIED_KINDS.index("mud")}
+    assert carried["brought"] == pytest.approx(carried["left_behind"] + carried["on_soles"], abs=1e-9)
+    assert carried["left_behind"] > 0
+    assert bake_report.stale_reasons(scene) == ()
+
+
 def test_soles_take_up_what_wets_hard_ground_and_a_bake_without_it_is_outdated(scene):
     options = scene.softground
     listed(box(scene, "Path", 0.002, y=(-4.5, LOW - 0.3), bottom=-0.5))

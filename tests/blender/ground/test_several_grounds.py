@@ -58,6 +58,10 @@ def also(*objects):
     return [further_grounds.add(bpy.context.scene.softground, obj) for obj in objects][-1]
 
 
+def codes(result):
+    return [row["code"] for row in result.report["self_check"]]
+
+
 def record_of(ground):
     return baked_ground.record_of(ground)
 
@@ -853,6 +857,17 @@ def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_c
     assert rows_about(CRATE) == []
     bpy.ops.softground.clear_bake()
     assert fingerprints.of_file() == before
+
+
+def test_a_ground_that_others_alone_have_walked_on_is_no_finding_of_the_next_bake(crate):
+    scene, options = bpy.context.scene, bpy.context.scene.softground
+    bake(scene)
+    first, armature = options.ground, options.characters[0].armature
+    options.ground = plane(scene, size=9.0, vertices=200)
+    assert codes(bake(scene)).count("unlisted_prints") == 1
+    armature.name = "Twin"  # as another of the same kind, who was not there
+    assert "unlisted_prints" not in codes(bake(scene))
+    assert bake_report.unlisted(options) == [first]
 
 
 def test_clear_bake_is_off_where_only_grounds_that_left_the_list_have_prints(crate):

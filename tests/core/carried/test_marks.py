@@ -152,7 +152,7 @@ def rolled(turns=3.6, onto=1.0, radius=0.2, slide=False):
     contacts = replace(loads.contacts, touching=loads.contacts.touching & ~hard[:, None], hard=hard[:, None])
     loads = replace(loads, contacts=contacts)
     name, sole = loads.motion.name, loads.motion.soles[0].sole.name
-    found = marks_of([loads], [], floor, surface="mud", brought={name: 1.0})
+    found = marks_of([loads], [], floor, surface="mud", brought={name: ("mud", 1.0)})
     assert sole == found.floors.soles[0].of[1]
     return found, loads
 
@@ -201,10 +201,20 @@ def test_without_what_sticks_or_without_a_floor_there_are_no_marks():
 def test_dirty_soles_leave_marks_though_they_step_into_nothing():
     loads, footprints, _ = crossing()
     muted = range(len(footprints))
-    clean, dirty = marks(muted=muted), marks(muted=muted, brought={loads.motion.name: 0.8})
+    clean, dirty = marks(muted=muted), marks(muted=muted, brought={loads.motion.name: ("mud", 0.8)})
     assert not clean.mass.any()
     assert dirty.carried.brought > 0 == dirty.carried.picked_up
     assert mass_of_steps(dirty).sum() == pytest.approx(dirty.carried.brought - dirty.carried.on_soles, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["mud", "snow", "paint"])
+def test_soles_bring_any_kind_onto_a_floor_beside_ground_that_does_not_stick(kind):
+    loads, _, _ = crossing()
+    found = marks("sand", brought={loads.motion.name: (kind, 1.0)})
+    assert found.floors.kind == kind
+    assert found.carried.brought > 0 == found.carried.picked_up
+    assert mass_of_steps(found).sum() == pytest.approx(found.carried.brought - found.carried.on_soles, abs=1e-9)
+    assert marks("sand", brought={loads.motion.name: (kind, 0.0)}) is None
 
 
 def test_a_muted_step_takes_nothing_up_and_all_muted_leave_a_clean_floor():

@@ -31,7 +31,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     baked = state()
 
     show_alone(bpy.types.SOFTGROUND_PT_steps)
-    for _ in range(24):
+    for _ in range(6):
         yield from hand.key("WHEELDOWNMOUSE")
     yield from hand.press_button("softground.choose_step", offset=0.3)
     yield 0.3

@@ -24,7 +24,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.5
     yield from hand.move(menu[0], menu[1] - 110)
     yield 1.5
-    yield from hand.picture("presets")
+    yield from hand.picture("presets", of="UI", is_high=True)
     yield from hand.key("ESC")
     yield from hand.choose_in_menu(menu, "MUD"[0])
     facts["preset"] = scene().softground.material.preset
