@@ -25,6 +25,7 @@ from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import curves_of, inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
+from ..playback import weather_modifier
 from . import marks_nodes as nodes
 from .marks_material import material_for, reads_clock
 
@@ -35,6 +36,8 @@ ORIGIN, MADE_FOR = "softground_marks_origin", "softground_marks_made_for"
 """Properties of its mesh, where its origin was [Blender units], and of its node group, for what it was made."""
 LOOKS_OTHER = "softground_marks_look"
 """Of the object: true where a material was not ours, which may read what the viewport does not work out."""
+WITHOUT_WEATHER = {name: value for name, value, *_ in nodes.SLIDERS}
+"""Values at first of the sliders that follow the ground's weather."""
 SELECTED = {".select_vert", ".select_edge", ".select_poly"}
 """What new elements of a mesh are, which takes a thirtieth of it in a file."""
 FLOORS, THICKNESS = "softground_floors", "softground_thickness"
@@ -106,6 +109,14 @@ def values(mesh: Any, name: str) -> NDArray[np.float64]:
     numbers = np.empty(len(attribute), np.float32 if mesh.attributes[name].data_type == "FLOAT" else np.int32)
     attribute.foreach_get("value", numbers)
     return numbers.astype(float)
+
+
+def follow_weather(ground: bpy.types.Object, shown: bpy.types.Object) -> None:
+    """Have the marks of a ground, if there are any, follow the weather on what shows its prints; none without."""
+    obj = of(ground)
+    modifier = obj and _modifier_of(obj)
+    if modifier:
+        weather_modifier.lead(shown, modifier, WITHOUT_WEATHER)
 
 
 def floors_of(obj: bpy.types.Object) -> FloorSteps:
@@ -192,6 +203,8 @@ def _play(modifier: Any, group: Any) -> None:
     """Have marks play a group, with what the artist has set."""
     if modifier.node_group == group:
         return
+    if modifier.node_group:
+        weather_modifier.let_go(modifier, WITHOUT_WEATHER)
     chosen = _sliders(modifier)
     modifier.node_group = group
     set_inputs(modifier, chosen)
@@ -200,8 +213,10 @@ def _play(modifier: Any, group: Any) -> None:
 def sliders_of(obj: bpy.types.Object, frame: float) -> dict[str, float]:
     """Values of the sliders of marks at a frame of the animation by name, those at first where the artist has none."""
     modifier = _modifier_of(obj)
-    keyed = curves_of(modifier) if modifier and modifier.node_group else {}
-    return _sliders(modifier) | {name: curve.evaluate(frame) for name, curve in keyed.items()}
+    if not (modifier and modifier.node_group):
+        return _sliders(modifier)
+    keyed = {name: curve.evaluate(frame) for name, curve in curves_of(modifier).items()}
+    return _sliders(modifier) | weather_modifier.led_values(modifier, frame) | keyed
 
 
 def _sliders(modifier: Any) -> dict[str, float]:

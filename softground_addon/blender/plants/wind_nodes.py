@@ -13,35 +13,29 @@ import bpy
 
 from ...core.plants.bending import Plant
 from ...core.plants.swaying import swayed
-from .. import compat
 from ..nodes.node_graph import NodeGraph, Number
-from ..nodes.node_modifiers import GroupInput, inputs_of, modifier_with, new_group
+from ..nodes.node_modifiers import GroupInput, modifier_with, new_group
 from ..playback import weather_modifier
 from .table_nodes import Table
 from .trampling_layout import WIND
 
 GROUP = MARK = "SoftGround Wind"
-_WIND = "Wind"
+CALM = {"Wind": 0.0}
+"""What the table has without weather [m/s]."""
 
 
 def follow(table: bpy.types.Object, shown: bpy.types.Object) -> None:
     """Have the table of a ground's plants follow the wind of the weather on what shows its prints; none without."""
-    known, weather = modifier_with(table, is_wind), cast("Any", weather_modifier.modifier_of(shown))
-    if known is not None:
-        table.driver_remove(compat.input_path(known, inputs_of(known)[_WIND]))
-    if weather is None or weather.node_group is None:
+    known = modifier_with(table, is_wind)
+    if weather_modifier.modifier_of(shown) is None:
         if known is not None:
+            weather_modifier.let_go(known, CALM)
             table.modifiers.remove(known)
         return
     modifier: Any = known or table.modifiers.new(GROUP, "NODES")
     if known is None:
         modifier.node_group = next(filter(is_wind, bpy.data.node_groups), None) or _group()
-    driver = table.driver_add(compat.input_path(modifier, inputs_of(modifier)[_WIND])).driver
-    driver.type = "SUM"
-    variable = driver.variables.new()
-    target = variable.targets[0]
-    target.id, target.data_path = shown, compat.input_path(weather, inputs_of(weather)[_WIND])
-    target.use_fallback_value = True  # of none, where the user removes the weather
+    weather_modifier.lead(shown, modifier, CALM)
 
 
 def is_wind(tree: Any) -> bool:
@@ -50,9 +44,10 @@ def is_wind(tree: Any) -> bool:
 
 
 def _group() -> Any:
-    graph = NodeGraph(new_group(GROUP, MARK, [GroupInput(_WIND, 0.0, "Of the weather [m/s]")]))
+    inputs = [GroupInput(name, value, "Of the weather [m/s]") for name, value in CALM.items()]
+    graph = NodeGraph(new_group(GROUP, MARK, inputs))
     given = graph.node("NodeGroupInput").outputs
-    graph.finish(graph.store(given["Geometry"], WIND, given[_WIND], True))
+    graph.finish(graph.store(given["Geometry"], WIND, given["Wind"], True))
     return graph.tree
 
 

@@ -22,6 +22,7 @@ from ...core.weather.felt_weather import felt_in
 from ...core.weather.weather import Matter, Span, moment_of, span_of
 from ...core.weather.weather_places import NOT_YET, POWERS, WeatherPlaces, soaking_shares, weather_places
 from .. import compat, jobs, settings
+from ..carried import marks_object
 from ..ground import baked_ground, ground_mesh, ground_surface
 from ..plants import trampling_table, wind_nodes
 from ..playback import own_data, weather_inputs, weather_modifier, weather_table
@@ -78,7 +79,7 @@ def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: s
     display_mesh = baked_ground.display_mesh_of(settings.resolve(name))
     modifier = existing or weather_modifier.put(display_mesh, tree)
     weather_keys.follow(display_mesh)
-    _blow(settings.resolve(name))
+    lead(settings.resolve(name))
     if preset:
         set_preset(modifier, preset)
     return modifier
@@ -87,13 +88,15 @@ def adding(ground: bpy.types.Object, record: BakeRecord | None = None, preset: s
 def remove(ground: bpy.types.Object) -> None:
     """Take the weather off a ground; the bake stays as it is."""
     weather_modifier.remove(baked_ground.display_mesh_of(ground))
-    _blow(ground)
+    lead(ground)
 
 
-def _blow(ground: bpy.types.Object) -> None:
-    """Let plants on a ground follow the wind of its weather, or none."""
+def lead(ground: bpy.types.Object) -> None:
+    """Have plants and marks of a ground follow its weather, or none."""
+    shown = baked_ground.display_mesh_of(ground)
     if table := trampling_table.of(ground):
-        wind_nodes.follow(table, baked_ground.display_mesh_of(ground))
+        wind_nodes.follow(table, shown)
+    marks_object.follow_weather(ground, shown)
 
 
 def values_of(ground: bpy.types.Object) -> dict[str, float]:

@@ -15,6 +15,7 @@ from softground_addon.blender.carried import marks_object
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import export_formats, exports, mark_images
+from softground_addon.blender.playback import weather_modifier
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.surfaces import CARRIED_KINDS
 from softground_addon.core.record import record
@@ -246,6 +247,58 @@ def test_rain_keeps_marks_wet_and_washes_them_off(scene):
     assert (values(mesh, "wetness") == 1.0).all()
     set_input(obj, "Rain", 0.0)
     assert (values(at(scene, 84), "mass") == before).all()
+
+
+def weather_on(scene, **sliders):
+    """Weather on the ground with sliders, and nothing else."""
+    assert bpy.ops.softground.add_weather(preset="SNOWFALL") == {"FINISHED"}
+    shown = baked_ground.display_mesh_of(scene.softground.ground)
+    weather = weather_modifier.modifier_of(shown)
+    for name, identifier in weather_modifier.inputs_of(weather).items():
+        compat.write_input(weather, identifier, sliders.get(name.replace(" ", "_"), 0.0))
+    shown.update_tag()
+    return weather
+
+
+def test_weather_washes_marks_at_once_and_removing_it_brings_them_back(scene):
+    obj = in_files(marks_object.of(scene.softground.ground))
+    before, at_first = values(at(scene, 84), "mass"), marks_object.sliders_of(obj, 84)
+    weather = weather_on(scene, Rain=20.0, Time_Scale=600.0)
+    mesh = at(scene, 84)
+    fallen = 20.0 / 3600.0 * 600.0 * (84 - values(mesh, "birth")) / 24
+    assert values(mesh, "mass") == pytest.approx(before * np.exp(-0.18 * fallen), rel=1e-4)
+    path = compat.input_path(weather, weather_modifier.inputs_of(weather)["Rain"])
+    for frame, rain in ((60, 0.0), (84, 20.0)):
+        compat.write_input(weather, weather_modifier.inputs_of(weather)["Rain"], rain)
+        weather.id_data.keyframe_insert(path, frame=frame)
+    assert [marks_object.sliders_of(obj, frame)["Rain"] for frame in (60, 84)] == pytest.approx([0.0, 20.0])
+    assert bpy.ops.softground.remove_weather() == {"FINISHED"}
+    assert marks_object.sliders_of(obj, 84) == pytest.approx(at_first)
+    assert (values(at(scene, 84), "mass") == before).all()
+
+
+def test_marks_of_another_bake_follow_the_weather_that_is_there(scene):
+    weather_on(scene, Rain=20.0, Time_Scale=600.0)
+    scene.softground.carried = 0.8
+    bake(scene)
+    obj = in_files(marks_object.of(scene.softground.ground))
+    assert marks_object.sliders_of(obj, 84)["Rain"] == 20.0
+    mesh = at(scene, 84)
+    assert 0.0 < values(mesh, "mass").sum() < values(obj.data, "mass").sum()
+
+
+def test_weather_leaves_what_the_user_has_set_or_keyed_of_marks(scene):
+    obj = marks_object.of(scene.softground.ground)
+    set_input(obj, "Rain", 3.0)
+    modifier = obj.modifiers[0]
+    path = compat.input_path(modifier, node_modifiers.inputs_of(modifier)["Time Scale"])
+    obj.keyframe_insert(path, frame=1)
+    weather_on(scene, Rain=20.0, Time_Scale=600.0, Drying=0.5)
+    followed = marks_object.sliders_of(obj, 84)
+    assert (followed["Rain"], followed["Time Scale"], followed["Drying"]) == (3.0, 1.0, 0.5)
+    assert bpy.ops.softground.remove_weather() == {"FINISHED"}
+    after = marks_object.sliders_of(obj, 84)
+    assert (after["Rain"], after["Time Scale"], after["Drying"]) == pytest.approx((3.0, 1.0, 0.2))
 
 
 def test_they_play_without_the_add_on(scene, baked):
