@@ -199,9 +199,11 @@ def blades(
     return tufts
 
 
-def leaves(dark: Colour, light: Colour, count: int = 6) -> bpy.types.Collection:
-    """Fallen leaves, folded along the middle and curled."""
-    look = material("leaf", dark, light, 0.55, through=0.25)
+def leaves(
+    dark: Colour, light: Colour, count: int = 6, name: str = "leaf", through: float = 0.25
+) -> bpy.types.Collection:
+    """Fallen leaves, folded along the middle and curled; a material for each name."""
+    look = material(name, dark, light, 0.55, through)
     return pieces_of("Leaves", [_leaf(np.random.default_rng(number), look) for number in range(count)])
 
 

@@ -12,6 +12,7 @@ from sample_scenes.make_all import build_all
 HEROES = (
     "snow_at_dusk",
     "meadow",
+    "autumn_leaves",
     "path_after_rain",
     "tyre_and_boot",
     "dune_runner",
