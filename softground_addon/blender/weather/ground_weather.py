@@ -102,9 +102,18 @@ def remove(ground: bpy.types.Object) -> None:
     _blow(ground)
 
 
+def follow(ground: bpy.types.Object) -> None:
+    """Have the weather of a ground follow its keys, and plants stand still where the user has removed its modifier."""
+    display_mesh = baked_ground.display_mesh_of(ground)
+    weather_keys.follow(display_mesh)
+    if weather_modifier.modifier_of(display_mesh) is None:
+        _blow(ground)
+
+
 def _blow(ground: bpy.types.Object) -> None:
     """Let plants on a ground follow the wind of its weather, or none."""
-    if table := trampling_table.of(ground):
+    table = trampling_table.of(ground)
+    if table and not table.library:
         wind_nodes.follow(table, baked_ground.display_mesh_of(ground))
 
 
