@@ -25,7 +25,7 @@ from .reading import analysis
 from .sampling.sampling_scene import IS_TEMPORARY
 from .state import state
 from .viewport import overlay
-from .weather import weather_keys
+from .weather import ground_weather, weather_keys
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does; edited meshes may be what it steps on, or what prints."""
@@ -83,7 +83,7 @@ def _follow_deletion(options: Any) -> None:
 
 def _follow_weather_keys(options: Any) -> None:
     for ground in settings.listed_grounds(options):
-        weather_keys.follow(baked_ground.display_mesh_of(ground))
+        ground_weather.follow(ground)
 
 
 def compare_prediction() -> float | None:

@@ -256,6 +256,12 @@ def is_set_up(character: Any) -> bool:
     return exists(owner) if owner else is_prop(character)
 
 
+def _is_renamed(character: Any) -> bool:
+    """True of a character by whose rig's former name it is known: files of earlier versions may have two of one."""
+    others = [each.name for each in character.id_data.softground.characters]
+    return bool(character.name != character.armature.name and others.count(character.name) == 1)
+
+
 def character_of(character: Any) -> CharacterSettings:
     """An entry of the characters, with its joints and soles as the user left them."""
     armature = character.armature
@@ -290,7 +296,7 @@ def character_of(character: Any) -> CharacterSettings:
         body=name_of(character.body) if character.body and not armature else None,
         dirty_soles=character.dirty_soles,
         dirty_with="" if character.dirty_with == "GROUND" else character.dirty_with.lower(),
-        added_as=character.name if armature and character.name != armature.name else "",
+        added_as=character.name if armature and _is_renamed(character) else "",
     )
 
 

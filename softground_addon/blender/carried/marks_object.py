@@ -114,7 +114,7 @@ def values(mesh: Any, name: str) -> NDArray[np.float64]:
 def follow_weather(ground: bpy.types.Object, shown: bpy.types.Object) -> None:
     """Have the marks of a ground, if there are any, follow the weather on what shows its prints; none without."""
     obj = of(ground)
-    modifier = obj and _modifier_of(obj)
+    modifier = obj and not obj.library and _modifier_of(obj)
     if modifier:
         weather_modifier.lead(shown, modifier, WITHOUT_WEATHER)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any
 
 import bpy
@@ -15,6 +16,9 @@ TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACH
 """Modifiers that change a mesh from frame to frame with nothing keyed."""
 
 TIME_NODES = ("GeometryNodeInputSceneTime", "GeometryNodeSimulationInput")
+
+MOST_FOLLOWED = 1000
+"""Objects and other data named by a ground's modifiers that are looked at: a panel asks at each redraw."""
 
 _PLACING = ("location", "rotation_", "scale", "delta_", "constraints[", "matrix_")
 """How the paths of what places an object begin."""
@@ -70,12 +74,13 @@ def _changes(modifier: Any, keyed: tuple[str, ...], known: set[bpy.types.ID]) ->
 
 
 def _acts_over_time(block: bpy.types.ID, known: set[bpy.types.ID]) -> bool:
-    """True if what a modifier names moves, or is another from frame to frame; those known are not looked at again."""
-    if block in known:
+    """True if what a modifier names moves, or is another from frame to frame; those known are not looked at again, nor
+    are materials, which change looks alone."""
+    if block in known or len(known) > MOST_FOLLOWED or isinstance(block, bpy.types.Material):
         return False
     known.add(block)
     if isinstance(block, bpy.types.Collection):
-        return any(_acts_over_time(obj, known) for obj in block.all_objects)
+        return any(_acts_over_time(obj, known) for obj in islice(block.all_objects, MOST_FOLLOWED))
     if isinstance(block, bpy.types.Object):
         return bool(mover_of(block) or _bends(block, known))
     tree = getattr(block, "node_tree", None)
@@ -87,7 +92,7 @@ def _bends(obj: bpy.types.Object, known: set[bpy.types.ID]) -> bool:
     keyed = tuple(path for path, _ in animated_paths(obj))
     keys = getattr(obj.data, "shape_keys", None)
     of_data = [block for block in (obj.data, keys) if block]
-    shown = [item for item in ground_mesh.users_modifiers(obj) if item.show_viewport]
+    shown = [item for item in ground_mesh.users_modifiers(obj) if item.show_viewport] if obj.modifiers else []
     return any(map(_is_animated, of_data)) or any(_changes(item, keyed, known) for item in shown)
 
 

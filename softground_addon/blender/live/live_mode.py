@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.carving.carved_step import is_deep
+from ...core.composers.floor_prints import floor_prints
 from ...core.composers.playhead import Playhead, footprints_of
 from ...core.composers.pressed_shot import shares_of
 from ...core.composers.relief_plan import with_shoe_treads
@@ -289,7 +290,7 @@ class LiveMode:
         writing: list[tuple[jobs.Job[Published], Sequence[Footprint]] | None] = []
         for part, name, each, footprints in zip(self._parts, names, of_each, pressed, strict=True):
             if footprints or len(self._parts) == 1:
-                writing.append((yield from self._writing(part, name, each, footprints)))
+                writing.append((yield from self._writing(part, name, each, footprints, not any(writing))))
             else:
                 writing.append(None)
         for waiting in filter(None, writing):
@@ -320,9 +321,10 @@ class LiveMode:
         return made_with
 
     def _writing(
-        self, part: LivePart, name: ObjectName, made_with: BakeSettings, footprints: list[Footprint]
+        self, part: LivePart, name: ObjectName, made_with: BakeSettings, footprints: list[Footprint], has_floors: bool
     ) -> jobs.Job[tuple[jobs.Job[Published], Sequence[Footprint]]]:
-        """The job that publishes the prints of a part on the object of a name, and these."""
+        """The job that publishes the prints of a part on the object of a name, and these; with the steps on hard floors
+        if it has those."""
         now, shot = jobs.Progress("simulate", 0.0), self._analysis.shot.of_each_ground[part.number_in(self._wanted)]
         vertices = ground_surface.rest_vertices(settings.resolve(name), made_with.unit_scale_m, made_with.frame)
         pressing = PressedGround.at.slices(footprints, **at_the_end(made_with))
@@ -332,6 +334,9 @@ class LiveMode:
         place = baked_ground.on_itself(settings.resolve(name), index, vertices)
         baked = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
         loads = part.playhead.loads_by_now()
+        if has_floors:
+            treading = floor_prints.slices(loads, self._analysis.shot.terrain, made_with.cell_size_m)
+            baked = replace(baked, on_floors=(yield from jobs.meanwhile(now, treading)))
         throwing = with_debris.slices(baked, ground_of(made_with, shot), made_with, loads)
         baked, debris = yield from jobs.meanwhile(now, throwing)
         return publish(baked, debris, place, made_with), baked.footprints

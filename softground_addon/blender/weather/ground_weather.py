@@ -91,10 +91,19 @@ def remove(ground: bpy.types.Object) -> None:
     lead(ground)
 
 
+def follow(ground: bpy.types.Object) -> None:
+    """Have the weather of a ground follow its keys, and plants and marks none where the user has removed it."""
+    display_mesh = baked_ground.display_mesh_of(ground)
+    weather_keys.follow(display_mesh)
+    if weather_modifier.modifier_of(display_mesh) is None:
+        lead(ground)
+
+
 def lead(ground: bpy.types.Object) -> None:
     """Have plants and marks of a ground follow its weather, or none."""
     shown = baked_ground.display_mesh_of(ground)
-    if table := trampling_table.of(ground):
+    table = trampling_table.of(ground)
+    if table and not table.library:
         wind_nodes.follow(table, shown)
     marks_object.follow_weather(ground, shown)
 

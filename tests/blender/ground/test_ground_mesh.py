@@ -1,6 +1,7 @@
 """The ground as a mesh: read, pressed, and given back bit for bit."""
 
 from contextlib import ExitStack
+from unittest import mock
 
 import bpy
 import numpy as np
@@ -317,7 +318,23 @@ def test_what_stands_still_is_no_change_of_a_ground(scene):
     displace = ground.modifiers.new("Hills", "DISPLACE")
     displace.texture = bpy.data.textures.new("Hills", "CLOUDS")
     ground.modifiers.new("Rig", "ARMATURE").object = linked(scene, "Rig", bpy.data.armatures.new("Rig"))
+    material = bpy.data.materials.new("Glow")
+    keyed(material, "metallic", 0.0, 1.0)
+    tree = group_of(ground.modifiers.new("Look", "NODES"))
+    tree.nodes.new("GeometryNodeSetMaterial").inputs["Material"].default_value = material
     assert not still_ground.changes_with_time(ground)
+
+
+def test_a_ground_that_names_a_forest_is_soon_looked_at(scene):
+    forest, trunk = bpy.data.collections.new("Forest"), bpy.data.meshes.new("Trunk")
+    for _ in range(5000):
+        forest.objects.link(bpy.data.objects.new("Tree", trunk))
+    ground = grid(scene)
+    named = group_of(ground.modifiers.new("Theirs", "NODES")).nodes.new("GeometryNodeCollectionInfo")
+    named.inputs["Collection"].default_value = forest
+    with mock.patch.object(still_ground, "mover_of", wraps=still_ground.mover_of) as looked_at:
+        assert not still_ground.changes_with_time(ground)
+    assert 0 < looked_at.call_count <= still_ground.MOST_FOLLOWED
 
 
 def test_keys_on_the_points_of_a_ground_are_named(scene):

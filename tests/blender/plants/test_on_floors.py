@@ -109,3 +109,21 @@ def test_who_walks_over_a_deck_bends_nothing_in_the_valley_below_it(opened_as):
     scene.frame_set(60)
     assert angles(grass).max() < 1e-3
     assert not baked_ground.record_of(scene.softground.ground).on_floors
+
+
+def test_what_live_mode_keeps_has_the_steps_on_floors_as_well(opened_as):
+    scene = opened_as(with_a_slab)
+    place = on_the_floor(300)
+    pebbles = scattered(place)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    give_way(pebbles, kind="PEBBLES")
+    scene.frame_set(72)
+    baked = blades(pebbles)[0]
+    assert np.linalg.norm(baked - place, axis=1).max() > 0.01
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    scene.frame_set(1)
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    scene.frame_set(72)
+    assert bpy.ops.softground.live(keep=True) == {"FINISHED"}
+    scene.frame_set(72)
+    np.testing.assert_allclose(blades(pebbles)[0], baked, atol=1e-5)

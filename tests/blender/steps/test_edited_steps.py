@@ -15,6 +15,7 @@ from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.settings import identity_of, renamed
 from tests.blender import shots
 from tests.blender.grounds import heights, rest
 
@@ -113,6 +114,23 @@ def test_edits_stay_with_their_character_whatever_the_order_of_the_list_and_its_
     now = [settings.character_of(each) for each in characters]
     assert [each.name for each in now] == ["Ball", "Ann"]
     assert baked_ground.edits_of(ground, now).keys() == {name.replace("Walker", "Ann")}
+
+
+def test_edits_stay_with_their_characters_in_files_of_earlier_versions_where_two_were_added_by_one_name(shot):
+    ground_in(shot[0] / "plain.blend")
+    scene = bpy.context.scene
+    first = bpy.data.objects["Walker"]
+    first.name = "Ann"
+    other = bpy.data.objects.new("Walker", first.data)
+    scene.collection.objects.link(other)
+    entry = scene.softground.characters.add()
+    entry.name, entry.armature = "Walker", other
+    now = [settings.character_of(each) for each in scene.softground.characters]
+    assert len({identity_of(vars(each)) for each in now}) == 2
+    before = [{"name": each.name, **({"added_as": each.added_as} if each.added_as else {})} for each in now]
+    first.name = "Eve"
+    now = [settings.character_of(each) for each in scene.softground.characters]
+    assert renamed(before, now) == {"Ann": "Eve", "Walker": "Walker"}
 
 
 def test_an_edit_without_a_step_is_kept_and_named(shot):
