@@ -21,8 +21,15 @@ class _NotYetRun(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+        before = dict(vars(self))
         self.__class__ = ModuleType  # type: ignore[assignment]
-        self.__loader__.exec_module(self)  # type: ignore[union-attr]
+        try:
+            self.__loader__.exec_module(self)  # type: ignore[union-attr]
+        except BaseException:  # Python would forget the module; this is known to others, and runs anew for the next
+            vars(self).clear()
+            vars(self).update(before)
+            self.__class__ = _NotYetRun  # type: ignore[assignment]
+            raise
         return getattr(self, name)
 
 
@@ -37,7 +44,7 @@ class _AtFirstUse:
         """Specification of a module of the add-on, which is no package, as Python finds it; None of any other."""
         if not name.startswith(f"{__package__}."):
             return None
-        finders = [finder for finder in sys.meta_path if finder is not cls]
+        finders = [finder for finder in sys.meta_path if finder is not cls and hasattr(finder, "find_spec")]
         spec: Any = next(filter(None, (finder.find_spec(name, path, target) for finder in finders)), None)
         if spec is None or spec.submodule_search_locations:
             return None

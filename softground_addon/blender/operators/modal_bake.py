@@ -91,7 +91,8 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
     bl_idname = "softground.sink_feet"
     bl_label = "Sink Feet"
 
-    _pressed = staticmethod(sink_feet.sink_feet)
+    def _pressed(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        return sink_feet.sink_feet(scene)
 
     def _show(self, result: bake_job.BakeResult) -> None:
         gaps: Any = result.report["gaps_mm"]
@@ -117,7 +118,8 @@ class SOFTGROUND_OT_clean_feet(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    _job_of = staticmethod(clean_feet.clean_feet)
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[clean_feet.CleanFeet]:
+        return clean_feet.clean_feet(scene)
 
     def _show(self, result: clean_feet.CleanFeet) -> None:
         self.report({"INFO"}, result.summary)
@@ -132,7 +134,8 @@ class SOFTGROUND_OT_make_keys(_ChangingTheMotion):
     bl_idname = "softground.make_keys"
     bl_label = "Make Keys"
 
-    _job_of = staticmethod(make_keys.make_keys)
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[make_keys.MadeKeys, ...]]:
+        return make_keys.make_keys(scene)
 
     def _show(self, result: tuple[make_keys.MadeKeys, ...]) -> None:
         for made in result:
@@ -152,7 +155,8 @@ class SOFTGROUND_OT_root_motion(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    _job_of = staticmethod(root_motion.root_motion)
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[root_motion.Travel, ...]]:
+        return root_motion.root_motion(scene)
 
     def _show(self, result: tuple[root_motion.Travel, ...]) -> None:
         for travel in result:

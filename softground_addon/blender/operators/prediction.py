@@ -16,6 +16,7 @@ from bpy.props import FloatProperty
 
 from ...core.composers import prediction
 from ...core.errors import InputError
+from ...core.ground.ground_law import next_modulus
 from ...core.loads.cell_limits import Fineness
 from ...core.motion import motion
 from ...core.settings import BakeSettings
@@ -153,7 +154,7 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     """
     material = scene.softground.material
     law = settings.snapshot(scene).material
-    material.youngs_modulus = prediction.next_modulus(
+    material.youngs_modulus = next_modulus(
         [(material.youngs_modulus, state.shown_depths[scene.session_uid])], depth, law
     )
     state.shown_depths[scene.session_uid] = depth

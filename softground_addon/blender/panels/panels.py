@@ -214,16 +214,8 @@ class SOFTGROUND_PT_joints(CharacterPanel, bpy.types.Panel):
         character = active_character(settings.options_of(context))
         layout.prop(character, "armature")
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
-        layout.template_list(
-            "SOFTGROUND_UL_joints",
-            "",
-            character,
-            "joints",
-            character,
-            "active_joint",
-            rows=5,
-            maxrows=len(motion.JOINTS),
-        )
+        most, joints = len(motion.JOINTS), (character, "joints", character, "active_joint")
+        layout.template_list("SOFTGROUND_UL_joints", "", *joints, rows=5, maxrows=most)
         if joint := chosen_of(character, "joints", "active_joint"):
             layout.prop_search(joint, "bone", character.armature.data, "bones")
             layout.prop(joint, "end")

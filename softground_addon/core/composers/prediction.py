@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ground.ground_law import load_at
+from ..ground.ground_law import SOFTEST, next_modulus
 from ..ground.hard_ground import SeveralGrounds, soft_ground
 from ..ground.heightfield import HeightField
-from ..ground.material import MATERIAL_RANGES, GroundMaterial, Pressure
+from ..ground.material import GroundMaterial, Pressure
 from ..ground.soft_ground import SoftGround
 from ..loads.estimate import CharacterLoads
 from ..loads.shared_ground import grounds_under, loads_on
@@ -45,13 +45,8 @@ MATCH_TOLERANCE, CLOSE_ENOUGH, CERTAIN = 1e-2, 5e-3, 4e-2
 """Relative error of a matched depth of the middle contacts, and of all; and of all where one more guess suffices."""
 ALIKE = 0.03
 """Relative difference of depths by which contacts are alike."""
-FREE_TRIALS, MOST_TRIALS = 8, 40
-"""Moduli that are tried before their interval is halved, and in all."""
-LEAST_POWER, MOST_POWER = 0.1, 3.0
-"""Range of the power by which the load that a depth shows, over the modulus, falls with the modulus."""
-LEAST_LOAD = 1e-12
-"""Of a depth, over the modulus; less is none."""
-SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
+MOST_TRIALS = 40
+"""Moduli that are tried in all."""
 
 
 @dataclass(frozen=True)
@@ -289,30 +284,3 @@ def _try(
         tried.append((modulus, reached))
         if abs(reached - depth) <= tolerance * depth or (modulus == SOFTEST and reached < depth):
             break
-
-
-def next_modulus(tried: Sequence[tuple[float, float]], depth: float, material: GroundMaterial) -> float:
-    """The modulus [Pa] to try next for a depth [m], after others with the depths that they gave; the latest last.
-
-    Follows the law of the material, under the load that the latest two show.
-
-    Examples
-    --------
-    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2))
-    400000.0
-    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2, exponent=2.0))
-    800000.0
-    """
-    modulus, reached = tried[-1]
-    wanted, load = (max(float(load_at(at / material.layer_depth, material)), LEAST_LOAD) for at in (depth, reached))
-    power = 1.0
-    if len(tried) > 1 and tried[-2][0] != modulus and tried[-2][1] and reached:
-        before = float(load_at(tried[-2][1] / material.layer_depth, material))
-        power = float(np.clip(np.log(before / load) / np.log(modulus / tried[-2][0]), LEAST_POWER, MOST_POWER))
-    guess = modulus * (load / wanted) ** (1 / power)
-    softer = [before for before, deep in tried if deep > depth]
-    stiffer = [before for before, deep in tried if deep < depth]
-    low, high = max(softer, default=SOFTEST), min(stiffer, default=STIFFEST)
-    if softer and stiffer and (len(tried) >= FREE_TRIALS or not low < guess < high):
-        return float(np.sqrt(low * high))
-    return float(np.clip(guess, low, high))

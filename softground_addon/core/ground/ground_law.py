@@ -10,17 +10,26 @@ With exponent 1 and densest off it is the paper's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .material import FIRM_RATIO, GroundMaterial
+from .material import FIRM_RATIO, MATERIAL_RANGES, GroundMaterial
 
 PACKED = 1.0 - 1e-9
 """Nearest that a strain comes to the densest packing, under which the ground would bear any stress."""
 
 CRUSHED = 1e3
 """Loose strain, in densest packings, at which the strain is the densest to rounding."""
+
+SOFTEST, STIFFEST = MATERIAL_RANGES["youngs_modulus"]
+LEAST_LOAD = 1e-12
+"""Of a depth, over the modulus; less is none."""
+LEAST_POWER, MOST_POWER = 0.1, 3.0
+"""Range of the power by which the load that a depth shows, over the modulus, falls with the modulus."""
+FREE_TRIALS = 8
+"""Moduli that are tried for a depth before their interval is halved."""
 
 
 def strain(load: Any, material: GroundMaterial) -> Any:
@@ -75,3 +84,30 @@ def load_at(strain: Any, material: GroundMaterial) -> Any:
         firm = material.firm_depth / material.layer_depth
         loose = loose + (FIRM_RATIO - 1.0) * np.maximum(loose - firm, 0.0)
     return loose if material.exponent == 1.0 else loose**material.exponent
+
+
+def next_modulus(tried: Sequence[tuple[float, float]], depth: float, material: GroundMaterial) -> float:
+    """The modulus [Pa] to try next for a depth [m], after others with the depths that they gave; the latest last.
+
+    Follows the law of the material, under the load that the latest two show.
+
+    Examples
+    --------
+    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2))
+    400000.0
+    >>> next_modulus([(2e5, 0.06)], 0.03, GroundMaterial(2e5, 0.05, 0.2, exponent=2.0))
+    800000.0
+    """
+    modulus, reached = tried[-1]
+    wanted, load = (max(float(load_at(at / material.layer_depth, material)), LEAST_LOAD) for at in (depth, reached))
+    power = 1.0
+    if len(tried) > 1 and tried[-2][0] != modulus and tried[-2][1] and reached:
+        before = float(load_at(tried[-2][1] / material.layer_depth, material))
+        power = float(np.clip(np.log(before / load) / np.log(modulus / tried[-2][0]), LEAST_POWER, MOST_POWER))
+    guess = modulus * (load / wanted) ** (1 / power)
+    softer = [before for before, deep in tried if deep > depth]
+    stiffer = [before for before, deep in tried if deep < depth]
+    low, high = max(softer, default=SOFTEST), min(stiffer, default=STIFFEST)
+    if softer and stiffer and (len(tried) >= FREE_TRIALS or not low < guess < high):
+        return float(np.sqrt(low * high))
+    return float(np.clip(guess, low, high))

@@ -71,6 +71,44 @@ for _ in range(2):
 """
 
 
+FAILING = """
+import sys
+import bpy
+import softground_addon
+
+
+class Aged:
+    \"\"\"A finder as Python had them before 3.4, and some libraries that add-ons bring along still have.\"\"\"
+
+    find_module = staticmethod(lambda name, path=None: None)
+
+
+sys.meta_path.insert(0, Aged)
+softground_addon.register()
+module = sys.modules["softground_addon.blender.baking.bake_job"]
+names = set(vars(module))
+composers, sys.modules["softground_addon.core.composers"] = sys.modules["softground_addon.core.composers"], None
+for _ in range(2):
+    try:
+        module.bake
+    except ImportError as error:
+        print(error)
+    assert set(vars(module)) == names
+sys.modules["softground_addon.core.composers"] = composers
+assert callable(module.bake)
+softground_addon.unregister()
+"""
+
+
+def test_a_module_that_fails_at_first_use_says_so_each_time_and_runs_once_it_can(tmp_path):
+    program = tmp_path / "failing.py"
+    program.write_text(FAILING)
+    paths = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
+    finished = subprocess.run([sys.executable, program], env=paths, capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout.count("softground_addon.core.composers") == 2
+
+
 def test_enabling_runs_no_module_that_bakes_nor_does_anything_without_a_ground(tmp_path):
     program = tmp_path / "enabled.py"
     program.write_text(ENABLED)
