@@ -332,7 +332,9 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     for obj in _props_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
         parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
-    rig = {settings.resolve(character.armature): ""} if character.armature else {}  # it is compared by itself
+    rig: dict[bpy.types.ID, str] = {}
+    if character.armature:
+        rig[settings.resolve(character.armature)] = ""  # it is compared by itself
     for worn in _worn_by(objects, character):
         held = [text for each in worn.constraints if rig for text in input_hashes.of_settings(each, (), dict(rig))]
         parts.append(
