@@ -332,18 +332,17 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     for obj in _props_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
         parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
-    armature, known = settings.resolve(character.armature) if character.armature else None, dict[bpy.types.ID, str]()
+    rig: dict[bpy.types.ID, str] = {}
+    if character.armature:
+        rig[settings.resolve(character.armature)] = ""  # it is compared by itself
     for worn in _worn_by(objects, character):
-        carriers = [worn, *(above for above in ancestors(worn) if armature and above.type != "ARMATURE")]
-        held = [
-            text for obj in carriers for each in obj.constraints for text in input_hashes.of_settings(each, (), known)
-        ]
+        held = [text for each in worn.constraints if rig for text in input_hashes.of_settings(each, (), dict(rig))]
         parts.append(
-            f"{_of_mesh(worn)} {carriers[-1].parent_bone} {input_hashes.of_weights(worn, bones)} "
-            f"{input_hashes.of_place(carriers)}{input_hashes.of_shapes(worn)}{input_hashes.joined(held)}"
+            f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} "
+            f"{input_hashes.of_place([worn])}{input_hashes.of_shapes(worn)}{' '.join(held)}"
         )
-    if armature:
-        rigs = worn_rigs(objects, armature)
+    if character.armature:
+        rigs = worn_rigs(objects, settings.resolve(character.armature))
         parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
     return input_hashes.joined(sorted(parts))
 

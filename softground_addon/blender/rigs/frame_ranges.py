@@ -41,6 +41,19 @@ def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | Non
     return first, last
 
 
+def held_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | None:
+    """The same, but infinite where strips hold no pose beyond it: the rig is at rest there."""
+    animated = animated_range(scene, obj)
+    if animated is None:
+        return None
+    datas = [node.animation_data for node in (obj, *ancestors(obj)) if node.animation_data]
+    strips = [strip for data in datas for track in playing_tracks(data) for strip in track.strips if not strip.mute]
+    first, last = animated
+    opens = any(strip.frame_start == first and strip.extrapolation != "HOLD" for strip in strips)
+    closes = any(strip.frame_end == last and strip.extrapolation == "NOTHING" for strip in strips)
+    return -inf if opens else first, inf if closes else last
+
+
 def frames_with_shapes(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[int, int]:
     """First and last frame of the scene in which objects or their shape keys are animated; all of it without keys."""
     ranges = [each for obj in objects for each in (animated_frames(scene, obj), _of_shape_keys(obj)) if each]

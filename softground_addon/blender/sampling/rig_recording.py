@@ -15,7 +15,7 @@ from ...core.findings import Finding
 from ...core.rig.recording import Recording, SceneUnits
 from ..animation_layer.constraint_layer import LayerKind, without_layers
 from ..placement import world_matrix
-from ..rigs.frame_ranges import animated_range
+from ..rigs.frame_ranges import held_range
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .rig_checks import check_finite
@@ -48,7 +48,7 @@ def record(
         recording = yield from _read_keys(full_name, frames, names, units, below)
     else:
         recording = yield from _evaluate(scene, full_name, frames, names, units, props, shapes, below, handled=handled)
-    animated = None if handled else animated_range(scene, object_named(full_name))
+    animated = None if handled else held_range(scene, object_named(full_name))
     if animated:
         recording = replace(recording, animated=(animated[0] / units.time_stretch, animated[1] / units.time_stretch))
     return _checked(rig, recording, findings if handled else None)

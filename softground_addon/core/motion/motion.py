@@ -131,7 +131,8 @@ class CharacterMotion:
     ride : GroundRide or None
         Of the ground, in whose frame all of this is, where that moves.
     animated : (float, float) or None
-        Scene frames of the first key and the last, where that is known: before and after, poses are held.
+        Scene frames of the first key and the last, where that is known: before and after, poses are held. Infinite
+        where they are not.
     """
 
     name: str

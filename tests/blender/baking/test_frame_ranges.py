@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.panels.panels import _apart_from_scene
-from softground_addon.blender.rigs.frame_ranges import animated_frames
+from softground_addon.blender.rigs.frame_ranges import animated_frames, held_range
 from tests.blender import shots
 from tests.blender.grounds import bake
 from tests.blender.interface.test_selection import controlled
@@ -166,3 +166,18 @@ def test_a_pose_of_one_frame_is_held_and_prints_both_feet(scene, walker):
     assert sorted(step["contact"] for step in steps) == ["foot.L", "foot.R"]
     weight = scene.softground.characters[0].mass * 9.81
     assert sum(step["peak_force_n"] for step in steps) == pytest.approx(weight, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("extrapolation", "held"),
+    [("HOLD", (1.5, 48.5)), ("HOLD_FORWARD", (-np.inf, 48.5)), ("NOTHING", (-np.inf, np.inf))],
+)
+def test_poses_are_held_beyond_a_strip_only_as_it_says(scene, walker, extrapolation, held):
+    """Beyond other ends the rig is at rest, and no step may be drawn on from there."""
+    data = walker.animation_data
+    strip = data.nla_tracks.new().strips.new("walk", 1, data.action)
+    data.action = None
+    strip.frame_start, strip.frame_end = 1.5, 48.5
+    strip.extrapolation = extrapolation
+    assert held_range(scene, walker) == held
+    assert frames(scene, walker) == (1, 49)

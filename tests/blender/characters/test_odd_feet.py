@@ -114,6 +114,19 @@ def test_what_follows_a_bone_by_a_constraint_is_skin_as_what_hangs_on_it(scene, 
     assert staleness._of_body(scene.objects, wanted) != before
 
 
+def test_a_mesh_that_hangs_on_another_bone_is_another_though_the_rig_stands_under_an_empty(scene):
+    armature = robot("one")
+    armature.parent = bpy.data.objects.new("Root", None)
+    leg = next(obj for obj in scene.objects if obj.name.startswith("leg"))
+    leg.parent_type, leg.parent_bone = "BONE", leg.vertex_groups[0].name
+    wanted = character_of(add_character(scene, armature))
+    before = staleness._of_body(scene.objects, wanted)
+    armature.parent.location.x += 1.0  # which is compared by itself
+    assert staleness._of_body(scene.objects, wanted) == before
+    leg.parent_bone = "Body"
+    assert staleness._of_body(scene.objects, wanted) != before
+
+
 LEGS = {
     "named": {("BackUpLeg", "BackLowLeg", "BackFoot"): 0.5, ("FrontUpLeg", "FrontLowLeg", "FrontFoot"): -0.5},
     "unnamed": {("Thigh", "Calf", "Foot"): 0.5, ("b11", "b12", "b13"): -0.5},
