@@ -28,7 +28,7 @@ class _NotYetRun(ModuleType):
         except BaseException:  # Python would forget the module; this is known to others, and runs anew for the next
             vars(self).clear()
             vars(self).update(before)
-            self.__class__ = _NotYetRun  # type: ignore[assignment]
+            self.__class__ = _NotYetRun
             raise
         return getattr(self, name)
 
