@@ -16,13 +16,15 @@ ALOFT = 0.3
 """Least share of the frames in which nothing of a hovering body touches."""
 ALONG = 0.5
 """What touches goes along with the body if it moves against it by less than this part of the body's way."""
+STILL = 0.01
+"""A body that moves less than this while something touches at an end of the take rests there [leg lengths]."""
 
 
 def hovers(motion: CharacterMotion, contacts: Contacts) -> float:
     """Share of the frames in which nothing touches of a body that does not fall then, and never stands on what does.
 
     0 for others. A foot that stands moves against the body as far as the body moves, also on a belt; one that hovers
-    goes along.
+    goes along. What rests at an end of the take has rested before it, or does so after.
     """
     now, motion = motion.on_frames, motion.at_frames()
     touching = contacts.standing[now] & (contacts.clearance[now] < LEAVE_HEIGHT * motion.leg_length)
@@ -36,16 +38,17 @@ def hovers(motion: CharacterMotion, contacts: Contacts) -> float:
     if lost > FREE_FALL * motion.fall * (ends - 1 - firsts).sum() * motion.time_step:
         return 0.0
     for sole, on in zip(motion.soles, touching.T, strict=True):
-        if _stands(sole.landmark_positions().mean(axis=1) - centre, centre, on):
+        if _stands(sole.landmark_positions().mean(axis=1) - centre, centre, on, STILL * motion.leg_length):
             return 0.0
     return float(aloft.mean())
 
 
-def _stands(against: Array, centre: Array, on: Mask) -> bool:
+def _stands(against: Array, centre: Array, on: Mask, still: float) -> bool:
     """True if a sole at places `against` (F, 3) the body's centre (F, 3) stands in any of its contacts (F,)."""
     for first, end in zip(*runs(on), strict=True):
         moved, way = (np.linalg.norm(np.ptp(path[first:end], axis=0)) for path in (against, centre))
-        if end - first > 1 and moved >= ALONG * way:
+        rests = (first == 0 or end == len(on)) and way < still
+        if end - first > 1 and (moved >= ALONG * way or rests):
             return True
     return False
 

@@ -137,9 +137,8 @@ def test_a_character_that_leaves_no_print_is_pointed_out(walk):
     walk.softground.characters[0].armature.rotation_euler.x = np.pi
     walk.softground.ground = None
     bpy.context.view_layer.update()
-    report = bake(walk).report
-    assert report["totals"]["steps"] == 0
-    assert any("leaves no print" in warning for warning in report["warnings"])
+    with pytest.raises(InputError, match="'Walker' hovers, and leaves no print"):
+        bake(walk)
 
 
 def test_nothing_is_baked_where_nobody_moves_and_a_statue_among_others_is_pointed_out(walk):

@@ -182,7 +182,7 @@ def test_a_ground_that_changes_over_time_is_told_of_with_the_remedy(walk):
     ground.modifiers.new("Swell", "WAVE").height = 0.01
     bpy.context.view_layer.update()
     (warning,) = bake(walk, ground=ground, output="PRINTS", detail="AUTO").report["warnings"]
-    for part in ("'Field'", "'Swell'", "frame 3", "Apply the modifier"):
+    for part in ("'Field'", "'Swell'", "frame 3", "Apply that"):
         assert part in warning
 
 

@@ -865,7 +865,7 @@ def test_a_ground_that_others_alone_have_walked_on_is_no_finding_of_the_next_bak
     first, armature = options.ground, options.characters[0].armature
     options.ground = plane(scene, size=9.0, vertices=200)
     assert codes(bake(scene)).count("unlisted_prints") == 1
-    armature.name = "Twin"  # as another of the same kind, who was not there
+    armature.name = options.characters[0].name = "Twin"  # as another of the same kind, who was not there
     assert "unlisted_prints" not in codes(bake(scene))
     assert bake_report.unlisted(options) == [first]
 

@@ -90,19 +90,6 @@ def test_as_animated_gives_back_the_strength_of_tilt_from_before_wading(scene):
     assert not options.tilt.is_property_set("strength")
 
 
-@pytest.mark.parametrize("again", [False, True])
-def test_as_animated_unsets_the_strength_of_tilt_that_wading_of_an_earlier_version_has_set(scene, again):
-    tilt, grounding = scene.softground.tilt, scene.softground.grounding
-    tilt.use, tilt.strength, grounding.arms = True, 0.1, 0.5
-    if again:
-        bpy.ops.softground.response_preset(preset="WADING")
-    bpy.ops.softground.response_preset(preset="AS_ANIMATED")
-    assert not tilt.is_property_set("strength")
-    tilt.use, tilt.strength, grounding.arms = True, 0.1, 0.2
-    bpy.ops.softground.response_preset(preset="AS_ANIMATED")
-    assert tilt.strength == pytest.approx(0.1), "it is the user's"
-
-
 def test_the_preset_wading_acts_with_arms_trunk_and_speed_and_can_be_taken_back(scene):
     shots.walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()
