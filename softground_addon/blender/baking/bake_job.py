@@ -218,7 +218,7 @@ def _write_all(
         on_ground, of_ground = (yield from job) if len(writing) == 1 else jobs.run(job)
         kind = its_marks.floors.kind if its_marks else made_with.surface
         marks_object.put(on_ground.ground, its_marks, surface=kind, units=made_with)
-        weather.lead(on_ground.ground)
+        marks_object.follow_weather(on_ground.ground, on_ground.display_mesh)
         published.append(on_ground)
         findings += of_ground
     return published, findings
