@@ -13,7 +13,7 @@ from . import own_data, playback, weather_inputs, weather_table
 from . import weather_nodes as nodes
 
 MODIFIER = weather_inputs.GROUP
-FOLLOWS = "softground_weather"
+FOLLOWS = weather_inputs.MARK
 """Name of the variable of drivers by which inputs of other modifiers follow the weather's."""
 SAME = 1e-6
 """Difference of values that are the same in a single-precision property."""
