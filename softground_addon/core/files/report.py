@@ -16,7 +16,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
-from ..record.throws import WADE
+from ..record.throws import WADE, of_print
 from ..record.typical_depth import typical_of
 
 SCHEMA_VERSION = 1
@@ -91,7 +91,7 @@ def build(
             "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
-            "thrown_m3": sum(sum(step.thrown.values()) for step, _ in steps),
+            "thrown_m3": sum(of_print(step.thrown) for step, _ in steps),
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
@@ -117,18 +117,18 @@ def build(
 
 
 def _carved(carves: Iterable[Footprint], steps: Iterable[EditableStep]) -> dict[str, dict[str, float]]:
-    """Volumes that each character cut, packed into walls, left loose, also what flew, and found no place for [m³]."""
+    """Volumes that each character cut, packed into walls, left loose, threw, and found no place for [m³]."""
     volumes: dict[str, dict[str, float]] = {}
     for carve in carves:
         packed = carve.compressed_m3 - carve.rim_m3 - carve.unplaced_rim_m3
-        of_step = (carve.compressed_m3, packed, carve.rim_m3, carve.unplaced_rim_m3)
+        of_step = (carve.compressed_m3, packed, carve.rim_m3, 0.0, carve.unplaced_rim_m3)
         sums = volumes.setdefault(carve.character, {})
-        for name, volume in zip(("cut_m3", "packed_m3", "loose_m3", "unplaced_m3"), of_step, strict=True):
+        for name, volume in zip(("cut_m3", "packed_m3", "loose_m3", "thrown_m3", "unplaced_m3"), of_step, strict=True):
             sums[name] = sums.get(name, 0.0) + volume
     for step in steps:
-        if volume := step.thrown.get(WADE, 0.0):
+        if volume := step.thrown.get(WADE, 0.0):  # which the rim lacks
             sums = volumes[step.baked.character]
-            sums["loose_m3"] += volume  # which the rim lacks
+            sums["thrown_m3"] += volume
             sums["packed_m3"] -= volume
     return volumes
 

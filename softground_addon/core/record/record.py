@@ -142,8 +142,7 @@ class BakeRecord:
             baked = self.footprints[number % count]
             edited = None if edit.mute else self.pressed_again.get(number, None if copy else baked)
             lacking = self.thrown.get(number, {}) if edited else {}
-            of_print = sum(volume for phase, volume in lacking.items() if phase != step_throws.WADE)
-            edited = step_throws.booked(edited, of_print) if edited else edited
+            edited = step_throws.booked(edited, step_throws.of_print(lacking)) if edited else edited
             steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, edited, edit, copy > 0, lacking))
         return steps
 

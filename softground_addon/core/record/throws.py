@@ -161,6 +161,11 @@ def _throw(content: Mapping[str, Any], count: int) -> Throw:
     return Throw(number, phase, ThrowKind(kind), is_foot, **numbers, samples=samples.astype(np.float32))
 
 
+def of_print(thrown: Mapping[str, float]) -> float:
+    """Volume that the rim of a print lacks, of volumes thrown by phase [m³]; its carve lacks what was ploughed."""
+    return sum(volume for phase, volume in thrown.items() if phase != WADE)
+
+
 def booked(footprint: Footprint, volume: float) -> Footprint:
     """A footprint whose rim lacks the thrown volume [m³]."""
     volume = min(volume, footprint.rim_m3)
