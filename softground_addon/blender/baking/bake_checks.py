@@ -130,22 +130,3 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
             f"To have them on '{ground.name}' itself, clear the bake and create the ground again.",
         )
     ]
-
-
-def copy_findings(ground: bpy.types.Object) -> list[Finding]:
-    """Findings about a finer copy of a ground: it holds what modifiers show in the viewport."""
-    # Nodes may scatter objects for renders only, and those stay.
-    hidden = (modifier for modifier in ground.modifiers if modifier.show_render and not modifier.show_viewport)
-    names = [
-        f"'{modifier.name}'" for modifier in hidden if modifier.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")
-    ]
-    if not names:
-        return []
-    return [
-        Finding(
-            "render_modifiers",
-            "warning",
-            f"The finer copy of ground '{ground.name}' lacks what {' and '.join(names)} shows in renders only",
-            "show it in the viewport too (the modifier's screen icon), and bake again.",
-        )
-    ]

@@ -47,7 +47,7 @@ from ..reuse import reused
 from ..weather import ground_weather as weather
 from ..weather.weather_keys import WeatherBefore
 from . import bake_report, step_soles
-from .bake_checks import check_motion, copy_findings, coverage, coverage_findings, wants_detail
+from .bake_checks import check_motion, coverage, coverage_findings, wants_detail
 from .publish import Published, at_the_end, publish, sign, until_ready
 from .scene_findings import scene_findings
 from .shot_prints import GroundPrints, shot_prints
@@ -358,4 +358,4 @@ def _given(
         Progress("write", 0.15), ground_surface.pressed_vertices.slices(vertices, trail.covers, shot.terrain)
     )
     ground, draft = settings.resolve(name), settings.resolve(drafted_name)
-    return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]
+    return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *trail_detail.copy_findings(ground)]

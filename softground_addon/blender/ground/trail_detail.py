@@ -6,12 +6,15 @@ selected and active in its place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.findings import Finding
 from ...core.ground.terrain import MeshTerrain
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
@@ -224,3 +227,29 @@ def _exchange(detail: bpy.types.Object, draft: bpy.types.Object) -> None:
     if not old.users:
         bpy.data.meshes.remove(old)
     mesh.name = name
+
+
+def copy_findings(ground: bpy.types.Object) -> list[Finding]:
+    """Findings about a finer copy of a ground: it holds what modifiers show in the viewport."""
+    # Nodes may scatter objects for renders only, and those stay.
+    hidden = (modifier for modifier in ground.modifiers if modifier.show_render and not modifier.show_viewport)
+    lacking = [each.name for each in hidden if each.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")]
+    divides: Any = (each for each in ground.modifiers if each.type in ("SUBSURF", "MULTIRES"))
+    both = (each for each in divides if each.show_viewport and each.show_render)
+    coarser = [each.name for each in both if each.render_levels > each.levels]
+    findings = []
+    if lacking:
+        text = f"The finer copy of ground '{ground.name}' lacks what {_listed(lacking)} shows in renders only"
+        remedy = "show it in the viewport too (the modifier's screen icon), and bake again."
+        findings.append(Finding("render_modifiers", "warning", text, remedy))
+    if coarser:
+        text = (
+            f"The finer copy of ground '{ground.name}' has the viewport's levels of {_listed(coarser)} in renders too"
+        )
+        remedy = "where that shows, raise Levels Viewport to that of renders, and bake again."
+        findings.append(Finding("render_levels", "note", text, remedy))
+    return findings
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(f"'{name}'" for name in names)

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.baking import bake_report
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job, bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from tests.blender import fingerprints
 from tests.blender.grounds import as_rendered, field, mover, node_group, plane, refusal
@@ -211,3 +212,14 @@ def test_a_modifier_that_only_renders_show_is_told_of_where_a_copy_lacks_it(shor
     bpy.ops.softground.bake()
     (warning,) = ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
     assert "'Field' lacks what 'Bumps' shows in renders only: show it" in warning
+
+
+def test_levels_that_only_renders_have_are_told_of_where_a_copy_takes_the_prints(short_walk):
+    ground = field(short_walk)
+    for name, levels in (("Smooth", (1, 3)), ("Same", (1, 1))):
+        modifier = ground.modifiers.new(name, "SUBSURF")
+        modifier.levels, modifier.render_levels = levels
+    bpy.context.view_layer.update()
+    report = jobs.run(bake_job.bake(short_walk)).report
+    (found,) = [each for each in report["self_check"] if each["code"] == "render_levels"]
+    assert "'Field' has the viewport's levels of 'Smooth' in renders too" in found["message"]
