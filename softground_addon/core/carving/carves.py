@@ -36,6 +36,8 @@ FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
 NEAR = 0.4
 """Skin of bones that are further above the ground at all times is left out [m]: nothing is heaped up so high."""
+AWAY = 0.2
+"""Time after which a sole that takes no more steps here is on its way [s]: half a swing."""
 
 
 @sliced
@@ -167,6 +169,8 @@ class _Body:
     ) -> None:
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
+        self._left: list[int] = []
+        """Frame from which the sole of each part is away from its last step."""
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
         every = list(skin.triangles.values())
         outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
@@ -179,21 +183,22 @@ class _Body:
             is_near = near[triangles].any(axis=1)
             if taken and is_near.any():
                 of_used = np.searchsorted(used, triangles[is_near].T)
-                self._parts.append(
-                    (sole, taken, _nearest(taken, skin.frames), *numbered(of_used, len(used)), sides[is_near])
-                )
+                nearest = _nearest(taken, skin.frames)
+                self._parts.append((sole, taken, nearest, *numbered(of_used, len(used)), sides[is_near]))
+                left = taken[nearest[-1]].footprint.end_frame + AWAY * skin.frame_rate
+                self._left.append(int(np.searchsorted(skin.frames, left)))
 
     def parts(self, number: int) -> list[Part]:
         """The step that each part is nearest to at a frame, with the part."""
         return [Part(taken[nearest[number]], *skin) for _, taken, nearest, *skin in self._parts]
 
     def behind(self, number: int) -> list[CarvedStep]:
-        """The steps that soles are not nearest to any more at a frame."""
+        """The steps that soles are not nearest to any more at a frame, or away from for good."""
         before = max(number - 1, 0)
         return [
             taken[nearest[before]]
-            for sole, taken, nearest, *_ in self._parts
-            if sole != NO_SOLE and nearest[before] != nearest[number]
+            for (sole, taken, nearest, *_), left in zip(self._parts, self._left, strict=True)
+            if sole != NO_SOLE and (nearest[before] != nearest[number] or number == left)
         ]
 
 

@@ -104,8 +104,15 @@ def leg_soles(motion: CharacterMotion) -> dict[str, int]:
 
 
 def has_ankle(motion: CharacterMotion, side: str) -> bool:
-    """True if the foot of a leg turns against its shank."""
-    return f"ankle_{side}" in motion.joints
+    """True if the foot of a leg turns against its shank.
+
+    An ankle that no sole goes with is none where one goes with the shank: the IK target of a leg without a foot.
+    """
+    if f"ankle_{side}" not in motion.joints:
+        return False
+    if any(_is_on_ankle(motion, sole, side) for sole in motion.soles):
+        return True
+    return not any(_is_end_of_shank(motion, sole, side) for sole in motion.soles)
 
 
 def leg_of(motion: CharacterMotion, side: str, sole: int) -> Leg:
@@ -348,8 +355,11 @@ def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
     """True if a sole is the foot of a side, or worn on it such as a snowshoe."""
     if sole.sole.side.lower() not in (side, ""):
         return False
-    if not has_ankle(motion, side):
-        return _is_end_of_shank(motion, sole, side)
+    return (_is_on_ankle if has_ankle(motion, side) else _is_end_of_shank)(motion, sole, side)
+
+
+def _is_on_ankle(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
+    """True if a sole is near the ankle of a side, or moves with it."""
     distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
     is_near = float(distance.mean()) <= ON_THE_ANKLE * motion.leg_length
     is_rigid = float(np.ptp(distance)) < RIGID * motion.leg_length

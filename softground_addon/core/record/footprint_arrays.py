@@ -180,7 +180,9 @@ SPARSEST = 1000
 SPARE_CELLS = 2**20
 """Most cells of a window for each change in it, and on top of that: windows beyond would only fill the memory."""
 LONGEST_PAUSE = 10
-"""Most recorded frames that a footprint's changes span, for each that has a change or a load."""
+"""Most recorded frames that a footprint's changes span, for each that has a change or a load, on top of a carve's."""
+LONGEST_CARVE = 3000
+"""Frames of the longest shots in which bodies carve (`rig.skin_stances`): they may come by again much later."""
 
 
 def _check(footprint: Footprint) -> None:
@@ -221,5 +223,5 @@ def _check_ranges(footprint: Footprint) -> None:
             raise ValueError(f"{name} is {getattr(footprint, name):g}")
     frames = np.concatenate([footprint.compression.frames, footprint.rim.frames])
     longest = LONGEST_PAUSE * (len(frames) + len(footprint.load_frames)) * footprint.frame_step
-    if len(frames) and np.ptp(frames) > longest:
+    if len(frames) and np.ptp(frames) > LONGEST_CARVE + longest:
         raise ValueError("frames are too far apart")

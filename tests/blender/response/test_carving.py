@@ -27,7 +27,9 @@ from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from tests.blender import rigs, shots
+from tests.blender.carried.test_mass_of_clips import strips
 from tests.blender.characters import test_crawling
+from tests.blender.ground.test_hard_ground import listed
 from tests.blender.grounds import field
 
 FRAMES = 44
@@ -100,6 +102,21 @@ def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_a
     ]
     print(f"\nskin below the shown ground: at most {max(depths) * 1e3:.1f} mm")
     assert max(depths) <= CELL
+
+
+@pytest.mark.parametrize("cell_size", [CELL, 0.02])
+def test_where_snow_ends_at_a_floor_walls_crumble_as_the_foot_leaves_and_the_bake_is_read_again(scene, cell_size):
+    frames, end = 96, -1.0
+    walker(scene, frames, **DEEP)
+    snow, floor = (strips(scene, *each, 1, (-2.0, 2.0), 0.0) for each in (("Yard", [(end, 1)]), ("Floor", [(-6, end)])))
+    scene.softground.ground, scene.softground.cell_size, scene.softground.detail = snow, cell_size, "ALWAYS"
+    listed(floor)
+    bpy.context.view_layer.update()
+    _, record_of_bake = bake(scene)
+    assert all(end < step.position[1] for step in record_of_bake.footprints)
+    assert record_of_bake.carves
+    for carve in record_of_bake.carves.values():
+        assert max(carve.compression.frames.max(), carve.rim.frames.max()) < carve.start_frame + 40 < frames
 
 
 def runner(scene):

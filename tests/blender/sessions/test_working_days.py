@@ -171,6 +171,7 @@ class Day:
             return
         bpy.context.view_layer.update()
         if undone:
+            bpy.context.scene.frame_set(bpy.context.scene.frame_current)  # copies, too, are where the keys have them
             bpy.ops.ed.undo_push(message="before")
             before = fingerprints.of_file()
         self.call(operator, given)

@@ -21,7 +21,7 @@ from softground_addon.core.record.edits import (
     to_json,
     without_step,
 )
-from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.footprints import Changes, recompose
 from softground_addon.core.record.record import BakeRecord
 from softground_addon.core.record.throws import Throw
 from softground_addon.core.record.throws import to_json as to_json_of_throw
@@ -233,3 +233,13 @@ def test_a_record_with_more_steps_on_floors_than_footprints_is_damaged(footprint
     assert [step.start_frame for step in record.load(stored).on_floors] == [footprints[0].start_frame]
     with pytest.raises(InputError, match="clear the bake"):
         record.load(with_text(stored, on_floors=count))
+
+
+def test_a_place_that_a_body_cuts_again_much_later_is_read(footprints):
+    print = footprints[0]
+    few = Changes(
+        print.start_frame + np.array([0.0, 2000.0]), np.array([0, 1, 2], np.int32), *2 * [np.ones(2, np.int32)]
+    )
+    carve = replace(print, compression=few, rim=few, load_frames=np.empty(0), load_n=np.empty(0), pressed_by=None)
+    stored = record.dump(BakeRecord(list(footprints), {}, carves={0: carve}))
+    assert record.load(stored).carves[0].compression.frames.tolist() == few.frames.tolist()
