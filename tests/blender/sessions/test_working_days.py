@@ -8,7 +8,7 @@ import pytest
 
 from softground_addon.blender.animation_layer.constraint_layer import LayerKind, is_own
 from softground_addon.blender.compat import set_slot, slot_of
-from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.ground import baked_ground, look
 from softground_addon.blender.live import live
 from tests.blender import fingerprints, responders, shots
 from tests.blender.grounds import plane
@@ -213,8 +213,9 @@ class Day:
                 self.call(getattr(bpy.ops.softground, name), {})
         assert not live.is_on()
         for name in OWN:
-            if baked_ground.has_remains(bpy.data.objects[name]):  # of a ground that was chosen before
-                bpy.context.scene.softground.ground = bpy.data.objects[name]
+            ground = bpy.data.objects[name]
+            if baked_ground.has_remains(ground) or look.count_over_theirs(ground):  # of a ground that was chosen before
+                bpy.context.scene.softground.ground = ground
                 self.call(bpy.ops.softground.clear_bake, {})
 
     def key(self, luck, hour):
