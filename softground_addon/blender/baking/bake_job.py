@@ -17,6 +17,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.carving.fineness import fineness
 from ...core.composers.pressed_shot import edit_findings
 from ...core.composers.relief_plan import with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
@@ -282,7 +283,7 @@ def write_prints(
             place = yield from _created(drafts, scene, wanted, shot.layout, trail)
             record.about["inputs"]["ground"] = place.display_mesh.name
         else:
-            place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
+            place, findings = yield from _given(drafts, wanted, shot, shot.surface, footprints, trail, sole_length)
         del trail
         publishing = publish(record, debris, place, wanted)
         del place  # it is as large as what is pressed, and not needed to the end
@@ -326,6 +327,7 @@ def _given(
     wanted: BakeSettings,
     shot: Shot,
     surface: ground_surface.GroundSurface,
+    footprints: list[Footprint],
     trail: Trail,
     sole_length: float,
 ) -> Job[tuple[baked_ground.Place, list[Finding]]]:
@@ -347,9 +349,10 @@ def _given(
         findings = [*findings, undone_prints(ground)]
     reading = trail_detail.coarsest.slices(name, surface, unit_scale, cell_size, frame)
     coarse, level = yield from meanwhile(Progress("write", 0.1), reading)
-    refinement = yield from meanwhile(
-        Progress("write", 0.1), refine.slices(coarse, Region(trail.moved, cell_size), cell_size, closer)
-    )
+    fine = Region(trail.moved, cell_size), cell_size, closer
+    if wanted.relief == "OFF":
+        fine = fineness(trail.moved, footprints, cell_size)
+    refinement = yield from meanwhile(Progress("write", 0.1), refine.slices(coarse, *fine))
     drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)
     drafted_name = yield from meanwhile(Progress("write", 0.15), drafting)
     vertices = refinement.at_vertices(coarse, coarse.vertices)

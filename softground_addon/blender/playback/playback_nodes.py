@@ -35,6 +35,9 @@ LAST_HEIGHT, LAST_CONTACT = "softground_last_height", "softground_last_contact"
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 OF_PLAYBACK = (MOVED, START, END, SPLINE, OFFSET, LAST_HEIGHT, LAST_CONTACT, PRESSURE)
 
+SAMPLED = "softground_sampled"
+"""What is sampled of the splines, while the group works: change of height, compression, contact."""
+
 CONTACT = "softground_contact"
 """Of a spline's points; see `core.playback.playback_curves.PlaybackCurves`, which says what their positions hold."""
 
@@ -78,7 +81,9 @@ def build(
 
     graph.next_row()
     rest = graph.attribute(REST, "FLOAT_VECTOR")
-    height, compression = keyframe_tables.movement()
+    # Each node looks up its own fields: the curves are sampled once, for all that follow.
+    geometry = graph.store(geometry, SAMPLED, keyframe_tables.sampled(), looked_up, "FLOAT_VECTOR")
+    height, compression, contact = graph.separated(graph.attribute(SAMPLED, "FLOAT_VECTOR"))
     if not settled:
         at_rest = graph.both(moved, graph.compare("LESS_EQUAL", end, frame))
         geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
@@ -91,7 +96,6 @@ def build(
     aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
     shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
     rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
-    contact = keyframe_tables.contact()
     untouched = graph.compare("LESS_THAN", contact, -NO_CONTACT / 2)
     if few:
         untouched = graph.either(waiting, untouched)
@@ -103,7 +107,7 @@ def build(
         shaded = graph.store(shaded, name, value, looked_up)
     graph.next_row()
     shaded = graph.store(shaded, PRESSURE, graph.math("MAXIMUM", contact, 0.0), looked_up)
-    graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
+    graph.finish(graph.forgotten(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded), SAMPLED))
     return graph.tree
 
 
@@ -140,18 +144,14 @@ class _KeyframeTables:
         self._graph, self._splines, self._length = graph, splines, length
         self._number = graph.attribute(SPLINE, "INT")
 
-    def movement(self) -> tuple[Any, Any]:
-        """Change of the displayed height, and displayed compression [m]."""
+    def sampled(self) -> Any:
+        """Change of the displayed height, and displayed compression [m]; contact as in `PlaybackCurves`."""
         graph = self._graph
         node = graph.sample(self._splines, self._number, self._length)
-        _, height, compression = graph.separated(node.outputs["Position"])
-        return graph.math("MULTIPLY", height, 1 / NARROW), graph.math("MULTIPLY", compression, 1 / NARROW)
-
-    def contact(self) -> Any:
-        """See `core.playback.playback_curves.PlaybackCurves`."""
-        node = self._graph.sample(self._splines, self._number, self._length)
-        self._graph.link(self._graph.attribute(CONTACT), node.inputs["Value"])
-        return node.outputs["Value"]
+        graph.link(graph.attribute(CONTACT), node.inputs["Value"])
+        _, *movement = graph.separated(node.outputs["Position"])
+        height, compression = (graph.math("MULTIPLY", part, 1 / NARROW) for part in movement)
+        return graph.combined(height, compression, node.outputs["Value"])
 
 
 class _Graph(NodeGraph):

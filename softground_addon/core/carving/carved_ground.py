@@ -20,7 +20,7 @@ from ..pressing.repose import SWEEPS_TO_REST
 from ..record.footprints import QUANTUM, Footprint, quantised
 from ..soles.undersides import lowest_surface
 from .carved_step import CarvedStep
-from .carver import EDGE, HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, least_cut, pieces
+from .carver import EDGE, HIGHEST, REACH, SAMPLES, THICKEST, CarvedCells, in_cells, least_cut, of_ground, pieces
 
 MOST_POSES = 32
 """Most poses of a body in a frame."""
@@ -36,6 +36,8 @@ LEAST = round(3e-3 / QUANTUM)
 TOP, PLOUGHS_FROM, FRONT = 0.1, 1.0, 4
 """What is cut within so much of the open ground [m] may fly, as what cuts it goes so fast [m/s], from so many places
 along its front."""
+CELLS_ALONG_SOLE = 20
+"""Carving has cells of 2 x 2 of the ground where these are so fine that as many go along the shortest sole."""
 THIN = 2e-3
 """Loose matter that comes to rest is gathered where it is thinner [m]."""
 
@@ -122,6 +124,10 @@ class CarvedGround:
     """The ground of a shot as it is carved."""
 
     def __init__(self, ground: SoftGround, cell_size: float, steps: Sequence[CarvedStep], rate: float) -> None:
+        soles = [made_by.pressing.sole.length for step in steps if (made_by := step.footprint.pressed_by)]
+        self._across = 2 if 2 * cell_size * CELLS_ALONG_SOLE <= min(soles, default=0.0) else 1
+        """Cells of the ground along a cell."""
+        cell_size *= self._across
         self._ground, self._cell_size = ground, cell_size
         self._coming = sorted(steps, key=lambda step: step.begins, reverse=True)
         self._pressing: list[CarvedStep] = []
@@ -134,7 +140,7 @@ class CarvedGround:
         self._variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._site = SampledGrid(self._undisturbed_site, cell_size, channels=3)
         """Terrain, its openness, the layer's floor."""
-        self._cells = SampledGrid(self._untouched, cell_size, channels=5 + SAMPLES**2)
+        self._cells = SampledGrid(self._untouched, cell_size, channels=3 + 2 * self._across**2 + SAMPLES**2)
         """T, loose matter, what is recorded of the cut and of this, what has broken off, and K."""
         self._tops = SampledGrid(self._terrain, cell_size, channels=1)
         """Highest of the quarters of each cell, with the loose matter on it."""
@@ -154,8 +160,8 @@ class CarvedGround:
 
     def _untouched(self, x: Array, y: Array) -> Array:
         """The channels of a tile, from its cell centres."""
-        channels = np.zeros((5 + SAMPLES**2, *x.shape))
-        channels[:1], channels[5:] = self._terrain(x, y), np.inf
+        channels = np.zeros((self._cells.channels, *x.shape))
+        channels[: self._across**2], channels[-(SAMPLES**2) :] = self._terrain(x, y), np.inf
         return channels
 
     def _terrain(self, x: Array, y: Array) -> Array:
@@ -170,14 +176,16 @@ class CarvedGround:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
         while self._coming and self._coming[-1].begins <= frame:
             self._pressing.append(self._coming.pop())
-        self._contacts = [(step.footprint.window, step.touches(since, frame)) for step in self._pressing]
+        touched = (in_cells(step.footprint.window, step.touches(since, frame), self._across) for step in self._pressing)
+        self._contacts = [(window, touching.any(axis=0)) for window, touching in touched]
         for step, (window, touching) in zip(self._pressing, self._contacts, strict=True):
             change = step.change(since, frame)
             if change is None and not touching.any():
                 continue
             cells, channels = self._read(window)
             if change is not None:
-                cells.press(cells.pressed + change)
+                raised = in_cells(step.footprint.window, change, self._across)[1]
+                cells.press(cells.pressed + raised.reshape(cells.pressed.shape))
             cells.pack()
             self._write(step, window, cells, channels, frame)
         for step in [step for step in self._pressing if step.ends <= frame]:
@@ -222,7 +230,8 @@ class CarvedGround:
         """Cut the ground to one of the parts of bodies that are drawn."""
         step, walls = part.step, part.step.walls
         under = part.underside.min(axis=0)
-        deep = self._tops.read(part.window)[0] - under >= least_cut(self._contact(part.window), self._cell_size)
+        least = least_cut(self._contact(part.window), self._cell_size / self._across)
+        deep = self._tops.read(part.window)[0] - under >= least
         if (cut := part.window.around_cells(deep)) is None:
             return
         window = cut.expanded(self._margin)
@@ -294,7 +303,7 @@ class CarvedGround:
             holds, begins = step.walls.strength > 0, frames == self._frames_to_rest
             edge = ceil(2 * EDGE / self._cell_size)
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
-            window = step.recorder.window
+            window = self._of_recorder(step)
             most = np.max(self._crumbling(step, window.expanded(edge))) if begins else 0.0
             cells, _ = self._read(window)
             changed = np.where(cells.closed, 0.0, cells.surface - cells.terrain)
@@ -306,7 +315,7 @@ class CarvedGround:
                 deepest = pieces(window, self._cell_size, self._crumbling(step, window))
                 cells.crumble(deepest, held, self._bottom(window))
             if not holds and begins:
-                cells.gather(channels[3] * QUANTUM, THIN)  # then its edges slide as well
+                cells.gather(channels[-2 - SAMPLES**2] * QUANTUM, THIN)  # then its edges slide as well
             cells.slide(
                 step.walls,
                 held,
@@ -314,7 +323,7 @@ class CarvedGround:
                 ceil(sweeps / self._frames_to_rest),
             )
             if holds and frames == 1:
-                cells.gather(channels[3] * QUANTUM, THIN)
+                cells.gather(channels[-2 - SAMPLES**2] * QUANTUM, THIN)
             if frames == 1:
                 del self._settling[step]
             else:
@@ -324,7 +333,7 @@ class CarvedGround:
     def finish(self, step: CarvedStep, frame: float) -> None:
         """Record all of what a step has carved by the last frame."""
         if not step.at_rest and step.recorder.frames:
-            window = step.recorder.window.expanded(self._margin)
+            window = self._of_recorder(step).expanded(self._margin)
             self._write(step, window, *self._read(window), frame, 1)
 
     def footprint(self, step: CarvedStep) -> Footprint:
@@ -348,6 +357,10 @@ class CarvedGround:
             surface=footprint.surface,
         )
 
+    def _of_recorder(self, step: CarvedStep) -> Window:
+        """Cells of all changes of a step so far."""
+        return Window(*(side // self._across for side in step.recorder.window))
+
     def _contact(self, window: Window) -> Mask:
         """Cells of a window under soles that press."""
         contact = np.zeros((window.rows, window.columns), dtype=bool)
@@ -359,27 +372,29 @@ class CarvedGround:
     def _read(self, window: Window) -> tuple[CarvedCells, Array]:
         """The cells of a window, and their channels."""
         channels, (terrain, bears, _) = self._cells.read(window), self._site.read(window)
-        pressed, loose, _, _, broken = channels[:5]
-        contact = self._contact(window)
-        cells = CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, channels[5:], loose, broken)
-        return cells, channels
+        count, contact = self._across**2, self._contact(window)
+        pressed = channels[:count] if count > 1 else channels[0]
+        lowest, loose, broken = channels[-(SAMPLES**2) :], channels[count], channels[-1 - SAMPLES**2]
+        return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, lowest, loose, broken), channels
 
     def _write(
         self, step: CarvedStep, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int = LEAST
     ) -> None:
         """Write cells back, and record their changes that come to the least [QUANTUM] with a step."""
-        standing = cells.standing
-        carved = np.stack([cells.pressed - standing, cells.loose])
-        change = quantised(carved) - channels[2:4].astype(np.int64)
+        count = self._across**2
+        recorded = channels[count + 1 : 2 * count + 2]
+        change = quantised(np.concatenate([cells.cut_of_cells, cells.loose[None]])) - recorded.astype(np.int64)
         change *= (np.abs(change) >= least).any(axis=0)
-        channels[2:4] += change
-        channels[0], channels[1], channels[4], channels[5:] = cells.pressed, cells.loose, cells.broken, cells.lowest
+        recorded += change
+        channels[:count], channels[count], channels[-1 - SAMPLES**2] = cells.pressed, cells.loose, cells.broken
+        channels[-(SAMPLES**2) :] = cells.lowest
         self._cells.write(window, channels)
-        self._tops.write(window, np.minimum(cells.pressed, cells.lowest.max(axis=0, keepdims=True)) + cells.loose)
+        self._tops.write(window, np.minimum(cells.pressed, cells.lowest).max(axis=0, keepdims=True) + cells.loose)
         step.at_rest = least == 1
         step.cut += cells.cut_height
         step.packed += cells.packed
         step.unplaced += cells.unplaced
         if (part := window.around_cells(change.any(axis=0))) is not None:
-            change = change[:, *window.slices(part)]
-            step.recorder.add(frame, part, change, np.zeros(change.shape[1:], bool))
+            cut, loose = np.split(change[:, *window.slices(part)], [count])
+            change = np.stack([of_ground(each) for each in (cut, np.broadcast_to(loose, cut.shape))])
+            step.recorder.add(frame, part.refined(self._across), change, np.zeros(change.shape[1:], bool))

@@ -15,9 +15,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import ceil, pi, tan
+from math import ceil, isqrt, pi, tan
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..ground.material import GroundMaterial
 from ..ground.sparse_grid import Window
@@ -117,8 +119,8 @@ class CarvedCells:
         Cells that nothing is cut from or laid on: off the ground.
     contact : (rows, columns) bool array
         Cells under a sole that presses: these are not cut by its own skin, and nothing is laid there.
-    pressed : (rows, columns) float array
-        Height of the pressed ground T, with its rims [m].
+    pressed : (rows, columns) or (4, rows, columns) float array
+        Height of the pressed ground T, with its rims [m]; of the quarters of each cell, where these are the ground's.
     lowest : (4, rows, columns) float array
         Lowest underside K so far in the quarters of each cell [m], infinite where none passed.
     loose : (rows, columns) float array
@@ -143,19 +145,38 @@ class CarvedCells:
 
     @property
     def standing(self) -> Array:
-        """Height of what stands, (rows, columns) [m]: the middle of its quarters."""
-        return _middle(np.minimum(self.pressed, self.lowest))
+        """Height of what stands, (rows, columns) [m]: the middle of its quarters, or the mean if each is a cell."""
+        return self._whole(np.minimum(self.pressed, self.lowest))
 
     @property
     def surface(self) -> Array:
         """Height of the ground, (rows, columns) [m]."""
         return self.standing + self.loose
 
+    @property
+    def _across(self) -> int:
+        """Cells of the ground along the side of a cell."""
+        return SAMPLES if self.pressed.ndim == 3 else 1
+
+    @property
+    def _standing_cells(self) -> Array:
+        """Height of what stands in each cell of the ground, (1 or 4, rows, columns) [m]."""
+        return np.minimum(self.pressed, self.lowest) if self._across > 1 else self.standing[None]
+
+    @property
+    def cut_of_cells(self) -> Array:
+        """How far that lies below the pressed ground, (1 or 4, rows, columns) [m]."""
+        return np.asarray(self.pressed - self._standing_cells)
+
+    def _whole(self, quarters: Array) -> Array:
+        """What the cells have by their quarters, (rows, columns)."""
+        return np.asarray(quarters.mean(axis=0)) if self._across > 1 else _middle(quarters)
+
     def press(self, pressed: Array) -> None:
-        """Go on to the pressed ground (rows, columns) of a later moment [m]; on carved ground its rims are loose."""
-        before, raised = self.standing, pressed - self.pressed
+        """Go on to the pressed ground of a later moment, as `pressed` [m]; on carved ground its rims are loose."""
+        before, raised = self.cut_of_cells, np.reshape(pressed - self.pressed, (-1, *self.loose.shape))
         self.pressed = pressed
-        more = np.where(raised > 0, raised - (self.standing - before), 0.0)
+        more = np.where(raised > 0, self.cut_of_cells - before, 0.0).mean(axis=0)
         self.cut_height += float(more.sum())
         self.loose += more
 
@@ -183,13 +204,14 @@ class CarvedCells:
         """
         standing = np.minimum(self.pressed, self.lowest)
         depth = standing + self.loose - underside
-        least = np.where(self.closed, np.inf, least_cut(self.contact, self.cell_size))
+        least = np.where(self.closed, np.inf, least_cut(self.contact, self.cell_size / self._across))
         depth = np.where(depth >= least, depth, 0.0)
         if not depth.any():
             return depth[0]
         before, beyond = self.standing, depth > self.loose
         self.lowest = np.where(beyond, standing - (depth - self.loose), self.lowest)
-        of_standing, of_loose = before - self.standing, _middle(np.minimum(depth, self.loose))
+        of_standing, of_loose = before - self.standing, np.minimum(depth, self.loose)
+        of_loose = of_loose.max(axis=0) if self._across > 1 else _middle(of_loose)  # it lies level over all of a cell
         depth = of_standing + of_loose
         self.loose = np.maximum(self.loose - of_loose, 0.0)
         self.cut_height += float(of_standing.sum())
@@ -202,7 +224,7 @@ class CarvedCells:
     def _lay(self, thrown: Array, way: Array, bodies: Array) -> None:
         """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
         laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
-        highest = bodies - self.standing - TOLERANCE
+        highest = bodies - self._standing_cells.max(axis=0) - TOLERANCE
         remaining = float(thrown.sum())
         for thickest in (THICKEST, HIGHEST, np.inf):
             room = np.maximum(np.minimum(highest, thickest) - self.loose, 0.0)
@@ -298,6 +320,34 @@ class CarvedCells:
 def least_cut(contact: Mask, cell_size: float) -> Array:
     """Least depth in the ground that is cut, from the cells (rows, columns) under soles that press [m]."""
     return np.where(contact, min(UNDER_SOLE, cell_size), TOLERANCE)
+
+
+def in_cells(window: Window, values: NDArray[Any], across: int) -> tuple[Window, NDArray[Any]]:
+    """The cells, of so many of the ground along each side, around a window of the ground, and its values in them.
+
+    Examples
+    --------
+    >>> cells, parts = in_cells(Window(3, 0, 2, 2), np.array([[1, 2], [3, 4]]), 2)
+    >>> cells, parts[:, 0].tolist()
+    (Window(column=1, row=0, columns=2, rows=1), [[0, 2], [1, 0], [0, 4], [3, 0]])
+    >>> of_ground(parts).tolist()
+    [[0, 1, 2, 0], [0, 3, 4, 0]]
+    """
+    column, row = window.column // across, window.row // across
+    right, up = -(-(window.column + window.columns) // across), -(-(window.row + window.rows) // across)
+    cells = Window(column, row, right - column, up - row)
+    around = cells.refined(across)
+    whole = np.zeros((around.rows, around.columns), values.dtype)
+    whole[around.slices(window)] = values
+    parts = whole.reshape(cells.rows, across, cells.columns, across).transpose(1, 3, 0, 2)
+    return cells, parts.reshape(-1, cells.rows, cells.columns)
+
+
+def of_ground(parts: NDArray[Any]) -> NDArray[Any]:
+    """Values of the ground's cells, (rows, columns), from those in each of carving (N², rows, columns)."""
+    number, rows, columns = parts.shape
+    across = isqrt(number)
+    return parts.reshape(across, across, rows, columns).transpose(2, 0, 3, 1).reshape(rows * across, -1)
 
 
 def pieces(window: Window, cell_size: float, crumbling: float | Array) -> Array:

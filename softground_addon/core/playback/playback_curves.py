@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.sparse_grid import SparseGrid
+from ..ground.sparse_grid import SparseGrid, Window
 from ..numerics.arrays import Array, Indices
 from ..numerics.intervals import in_order
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
-from ..record.footprints import Footprint
+from ..record.footprints import Changes, Footprint
 from ..relief.steps import NOTHING, StepRelief
 from .blocks import ChangesInBlocks
 from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
@@ -50,6 +51,12 @@ CONTACTS_HELD = 400_000
 
 SMALL = 1 << 19
 """Points of curves up to which they are not packed: eight megabytes."""
+
+WIDER, LONGEST = 1.25, 192
+"""Carves are worked out together while the box around them is hardly larger than all of theirs, over this many frames
+at most."""
+SAME = 1e-6
+"""Frames nearer to each other than this are the same."""
 
 PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
@@ -139,6 +146,9 @@ def playback_curves_at(
     known : list of Movements, optional
         Those of an earlier call of the same footprints and places, or an empty list that is filled.
     """
+    groups = carves_together(footprints)
+    relief = [_relief_of_all([relief[number] for number in group]) for group in groups] if relief else relief
+    footprints = [_as_one([footprints[number] for number in group]) for group in groups]
     nowhere = np.zeros(0, dtype=np.intp)
     nothing = np.zeros(0, dtype=np.float32)
     sizes, count, error = [nowhere], 0, 0.0
@@ -177,6 +187,67 @@ def playback_curves_at(
     arrays: dict[str, NDArray[Any]] = {name: packed.unpacked() for name, packed in whole.items()}
     spans = Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error)
     return spans, PlaybackCurves(np.concatenate(sizes), position, contact)
+
+
+def carves_together(footprints: Sequence[Footprint]) -> list[list[int]]:
+    """Numbers of the footprints, each alone but for carves that overlap: these move the same ground, to and fro."""
+    groups, carves, around, cells = [], list[int](), Window(0, 0, 0, 0), 0
+    for number, footprint in enumerate(footprints):
+        window = footprint.window
+        if len(footprint.contact_cells):
+            groups.append([number])
+        elif (
+            carves
+            and _goes_with(footprints[carves[0]], footprint)
+            and (around.union(window).cells <= WIDER * (cells + window.cells))
+        ):
+            carves.append(number)
+            around, cells = around.union(window), cells + window.cells
+        else:
+            carves, around, cells = [number], window, window.cells
+            groups.append(carves)
+    return groups
+
+
+def _goes_with(first: Footprint, carve: Footprint) -> bool:
+    """True if a carve is in the cells and at the frames of another, and not long after it."""
+    frames = (carve.start_frame - first.start_frame) / first.frame_step
+    alike = (first.cell_size, first.frame_step) == (carve.cell_size, carve.frame_step)
+    return alike and abs(frames - round(frames)) < SAME and abs(frames) < LONGEST
+
+
+def _as_one(carves: Sequence[Footprint]) -> Footprint:
+    """The changes of some carves as those of one, for `ChangesInBlocks`: frame after frame of each."""
+    if len(carves) == 1:
+        return carves[0]
+    windows = [carve.window for carve in carves]
+    window = reduce(Window.union, windows)
+
+    def joined(parts: Sequence[Changes]) -> Changes:
+        cells = []
+        for changes, part in zip(parts, windows, strict=True):
+            row, column = np.divmod(changes.cells[:], part.columns)
+            cells.append((row + part.row - window.row) * window.columns + column + part.column - window.column)
+        counts = np.concatenate([np.diff(changes.first) for changes in parts])
+        return Changes(
+            np.concatenate([changes.frames for changes in parts]),
+            np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+            np.concatenate(cells).astype(np.int32),
+            np.concatenate([changes.amounts[:] for changes in parts]),
+        )
+
+    compression, rim = (joined([getattr(carve, name) for carve in carves]) for name in ("compression", "rim"))
+    return replace(carves[0], window=window, compression=compression, rim=rim)
+
+
+def _relief_of_all(steps: Sequence[StepRelief]) -> StepRelief:
+    """The sum of relief."""
+    if len(steps) == 1:
+        return steps[0]
+    point, place = np.unique(np.concatenate([step.point for step in steps]), return_inverse=True)
+    change = np.zeros((len(point), 2))
+    np.add.at(change, place, np.concatenate([step.change for step in steps]))
+    return StepRelief(point, change, np.zeros(len(point)))
 
 
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_mesh, ground_surface
-from softground_addon.blender.playback import playback
+from softground_addon.blender.playback import playback, playback_nodes
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.playback.playback_curves import playback_curves_at
@@ -120,6 +120,7 @@ def test_shading_attributes_follow_the_same_time(scene, footprints, shape_keys):
         assert np.abs(floats(shown, "softground_compression") - sample.compression).max() <= 1e-3
         assert np.abs(floats(shown, "softground_rim") - sample.rim).max() <= 1e-3 + TOLERANCE
         np.testing.assert_allclose(floats(shown, "softground_age"), sample.age, atol=1e-5)
+        assert playback_nodes.SAMPLED not in shown.data.attributes
 
 
 @pytest.mark.usefixtures("share")

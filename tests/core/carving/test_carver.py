@@ -21,9 +21,11 @@ def walls_of(surface, angle=None):
     return walls if angle is None else Walls(walls.packing, walls.strength, np.radians(angle))
 
 
-def level(rows=60, columns=60):
+def level(rows=60, columns=60, quarters=1):
+    """Level ground, whose quarters may be cells of their own."""
     nothing, flat = np.zeros((rows, columns), bool), np.zeros((rows, columns))
-    return CarvedCells(CELL, flat, nothing, nothing.copy(), flat.copy(), np.full((4, *flat.shape), np.inf), flat.copy())
+    pressed = np.zeros((4, rows, columns)) if quarters > 1 else flat.copy()
+    return CarvedCells(CELL, flat, nothing, nothing.copy(), pressed, np.full((4, *flat.shape), np.inf), flat.copy())
 
 
 def block(cells, low, high, bottom):
@@ -102,13 +104,13 @@ def test_a_sole_that_presses_packs_what_lies_under_it_and_is_not_cut_by_its_own_
     assert not cells.loose[10:20, 10:20].any()
 
 
-@given(seed=st.integers(0, 2**32 - 1), surface=st.sampled_from(list(SURFACES)))
+@given(seed=st.integers(0, 2**32 - 1), surface=st.sampled_from(list(SURFACES)), quarters=st.sampled_from([1, 4]))
 @settings(max_examples=40, deadline=None)
-def test_whatever_bodies_do_nothing_is_lost_and_no_cut_heals(seed, surface):
+def test_whatever_bodies_do_nothing_is_lost_and_no_cut_heals(seed, surface, quarters):
     rng = np.random.default_rng(seed)
-    cells, walls = level(40, 50), walls_of(surface)
+    cells, walls = level(40, 50, quarters), walls_of(surface)
     cells.terrain = rng.normal(0, 0.02, (40, 1)).cumsum(axis=0) + np.zeros((40, 50))
-    cells.pressed = cells.terrain.copy()
+    cells.pressed = cells.pressed + cells.terrain
     cells.closed[:, 45:] = rng.random() < 0.5
     volume, pressed = cells.surface.sum(), 0.0
     for _ in range(6):
@@ -122,7 +124,7 @@ def test_whatever_bodies_do_nothing_is_lost_and_no_cut_heals(seed, surface):
         if rng.random() < 0.5:
             earlier = cells.surface.sum()
             sole = np.zeros_like(cells.pressed)
-            sole[low[0] : high[0], low[1] : high[1]] = -rng.uniform(0, 0.3)
+            sole[..., low[0] : high[0], low[1] : high[1]] = -rng.uniform(0, 0.3, (*sole.shape[:-2], 1, 1))
             cells.press(cells.pressed + sole + rng.uniform(0, 0.01))
             pressed += cells.surface.sum() - earlier
         cells.contact = rng.random(cells.contact.shape) < 0.05
@@ -160,14 +162,15 @@ def test_a_wall_falls_that_is_higher_than_its_cohesion_holds():
     assert cells.surface.sum() == pytest.approx(-cells.packed, rel=1e-9)
 
 
-def test_the_rim_of_a_later_print_rises_on_carved_ground():
-    cells = level()
+@pytest.mark.parametrize("quarters", [1, 4])
+def test_the_rim_of_a_later_print_rises_on_carved_ground(quarters):
+    cells = level(quarters=quarters)
     cells.cut(block(cells, (20, 20), (30, 30), -0.2), NOBODY, 1.0)
     volume = cells.surface.sum()
     rim = np.zeros_like(cells.pressed)
-    rim[18:32, 18:32] = 0.01
+    rim[..., 18:32, 18:32] = 0.01
     cells.press(cells.pressed + rim)
-    assert cells.surface.sum() == pytest.approx(volume + rim.sum(), rel=1e-12)
+    assert cells.surface.sum() == pytest.approx(volume + rim.sum() / quarters, rel=1e-12)
     assert cells.cut_height == pytest.approx(cells.packed + cells.loose.sum(), rel=1e-12), "what rose there is loose"
 
 

@@ -10,10 +10,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.sparse_grid import Window
 from softground_addon.core.playback.keyframe_tables import NO_CONTACT, keyframe_tables
-from softground_addon.core.playback.playback_curves import LENGTH, LOADING, NARROW, TICK, curves, playback_curves_at
+from softground_addon.core.playback.playback_curves import (
+    LENGTH,
+    LOADING,
+    NARROW,
+    TICK,
+    carves_together,
+    curves,
+    playback_curves_at,
+)
 from softground_addon.core.playback.ramps import QUANTUM, Ramps
-from softground_addon.core.playback.vertex_histories import PointContacts, VertexHistories, vertex_histories
+from softground_addon.core.playback.vertex_histories import (
+    CARVED_TOLERANCE,
+    PointContacts,
+    VertexHistories,
+    vertex_histories,
+)
+from softground_addon.core.record.footprints import FootprintRecorder, quantised
+from softground_addon.core.record.pressed_ground import PressedGround
+from softground_addon.core.relief.steps import StepRelief
 from tests.core.walkers import pressed, walk
 
 NO_RAMPS = Ramps.joined([], 2)
@@ -223,3 +240,53 @@ def test_end_to_end_no_place_reaches_into_another_and_all_times_are_known_to_a_t
         assert begin[-1] <= LENGTH
         assert (np.spacing(end) <= TICK).all()
     assert len(lines.size) < len(start) * 47 / LENGTH + 2
+
+
+def carved(column, start, rng, contact=0):
+    """A carve of 40 x 20 cells, from a frame on; one that touches is a print."""
+    recorder, window = FootprintRecorder(0.01, 1.0), Window(column, -10, 40, 20)
+    for frame in range(start, start + 20, 2):
+        change = rng.uniform(-0.01, 0.03, (2, 20, 40)) * (rng.random((20, 40)) < 0.4)
+        recorder.add(float(frame), window, quantised(change), np.full((20, 40), contact > 0))
+    numbers = dict.fromkeys(("area_m2", "peak_force_n", "compressed_m3", "rim_m3", "unplaced_rim_m3", "heading"), 0.0)
+    made = {"character": "", "sole": "", "position": np.zeros(3), "load_frames": np.zeros(0), "load_n": np.zeros(0)}
+    return recorder.footprint(**numbers, **made, start_frame=float(start), end_frame=start + 20.0)
+
+
+def test_carves_of_the_same_ground_share_one_tolerance_and_their_last_heights_are_exact():
+    rng = np.random.default_rng(3)
+    carves = [carved(20 * number, 10 + 8 * number, rng) for number in range(4)]
+    x, y = rng.uniform((0.0, -0.1), (1.0, 0.1), (400, 2)).T
+    given = {"blur_sigma": 0.01, "frame_rate": RATE}
+    spans, lines = unpacked(*playback_curves_at(carves, x, y, **given))
+    assert spans.error <= CARVED_TOLERANCE * 1.001
+    alone = sum(len(playback_curves_at([carve], x, y, **given)[1].position) for carve in carves)
+    assert len(lines.position) < alone
+    for frame in (14.0, 21.5, 33.0):
+        expected = PressedGround.at(carves, frame=frame, frame_rate=RATE, cell_size=0.01, blur_sigma=0.01).sample(x, y)
+        shown = np.zeros(len(x))
+        until = np.minimum(frame, spans.end)
+        shown[spans.point] = [sampled(spans, lines, place, at)[0] for place, at in enumerate(until)]
+        assert np.abs(shown - expected.display).max() <= spans.error + 1e-6
+    last = PressedGround.at(carves, frame=80.0, frame_rate=RATE, cell_size=0.01, blur_sigma=0.01).sample(x, y).display
+    assert np.bincount(spans.point, spans.last_height, len(x)) == pytest.approx(last, abs=5 * QUANTUM)
+
+
+def test_relief_of_carves_that_are_worked_out_together_is_all_there_in_the_end():
+    rng = np.random.default_rng(4)
+    carves = [carved(20 * number, 10 + 8 * number, rng) for number in range(3)]
+    x, y = rng.uniform((0.0, -0.1), (0.8, 0.1), (200, 2)).T
+    point = np.arange(200)
+    relief = [StepRelief(point[n::2], np.full((len(point[n::2]), 2), 2.0**-10), np.zeros(100)) for n in (0, 1, 0)]
+    given = {"blur_sigma": 0.01, "frame_rate": RATE}
+    spans = playback_curves_at(carves, x, y, relief=relief, **given)[0]
+    without = playback_curves_at(carves, x, y, **given)[0]
+    last = [np.bincount(each.point, each.last_height, 200) for each in (spans, without)]
+    assert last[0] - last[1] == pytest.approx(np.where(point % 2, 1, 2) * 2.0**-10, abs=4 * QUANTUM)
+
+
+def test_carves_far_apart_in_place_or_time_are_worked_out_on_their_own():
+    rng = np.random.default_rng(5)
+    near = [carved(0, 10, rng), carved(20, 14, rng), carved(10, 12, rng, contact=1)]
+    far = [carved(0, 900, rng), carved(400, 910, rng)]
+    assert carves_together([*near, *far]) == [[0, 1], [2], [3], [4]]
