@@ -13,8 +13,8 @@ LONGEST_TRACK = 8.0
 """Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
 
 LONGEST_SLIDE = 0.25
-"""How far a foot slides within one print, in body heights, or its own length if that is more, as of what crawls: further
-on, it is another place that it prints, ..."""
+"""How far a foot slides within one print, in body heights, or its own length if that is more, as of what crawls: then
+it is another place that it prints, ..."""
 SHORTEST_SLIDE = 0.08
 """... if it takes as long for it [s]."""
 
