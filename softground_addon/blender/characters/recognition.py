@@ -9,10 +9,12 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.numerics.arrays import Array
 from ...core.rig.bare_body import BareBody, with_toes
 from ...core.rig.bones import RigBones, extent
 from ...core.rig.mapping import RigMapping, SoleSource, bones_of
 from ...core.rig.recording import Recording
+from ...core.rig.rig_at_rest import RestPose
 from ...core.rig.rig_skin import RigSkin
 from ...core.rig.shown_contacts import shown_by_skin
 from ...core.rig.skin_mass import skin_mass
@@ -32,6 +34,9 @@ MOST_FRAMES = 500
 
 FOOT_REACH = 0.2
 """A foot and the bone with most of the skin on which it stands are nearer than this, over the size of the rig."""
+
+LEGS_APART = 0.1
+"""Feet of different legs of a skeleton are farther apart than this, over the size of the rig."""
 
 COVERS = 0.5
 """Extent of a body's skin over that of its joints from which its volume tells its mass."""
@@ -93,7 +98,8 @@ def recognise(
     if armature.mode == "EDIT":
         return Recognised(mapping)
     if skin is None:
-        return Recognised(mapping if mapping.soles else _mapped(armature, posed=True))
+        bare = _on_all_fours(armature, _mapped(armature, skinned=False), _mapped(armature, named=False, skinned=False))
+        return Recognised(bare if bare.soles else _mapped(armature, posed=True))
     units = units_about(scene, armature)
     samples = range(scene.frame_current, scene.frame_current + 1)
     moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
@@ -135,12 +141,39 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     return Recognised(RigMapping(soles=soles, method="skin", mass=mass), body.skin, recording, body)
 
 
-def _mapped(armature: bpy.types.Object, *, posed: bool = False, named: bool = True) -> RigMapping:
+def _mapped(armature: bpy.types.Object, **known: bool) -> RigMapping:
     """Mapping by names and rest pose, or without a skin by the current pose; empty if none of them gives one."""
     try:
-        return map_rig(armature, posed=posed, named=named)
+        return map_rig(armature, **known)
     except InputError:
         return RigMapping(method="skin")
+
+
+def _on_all_fours(armature: bpy.types.Object, mapping: RigMapping, shaped: RigMapping) -> RigMapping:
+    """The mapping of a skeleton without a skin, with the legs that its rest pose shows elsewhere than those named.
+
+    They stand apart from these as skirts and tails do not, and the trunk lies on all of them.
+    """
+    bones = rest_bones(armature)
+    size = extent(np.array([bone.head for bone in bones.values()]), np.eye(4))
+    further = tuple(sole for sole in shaped.soles if _gap(bones, sole, mapping.soles) > LEGS_APART * size)
+    is_told = len(mapping.soles) + len(further) == len(shaped.soles) > 0  # those that are named are among them
+    rest = RestPose.of(bones, shaped, np.array(armature.matrix_world)[None])
+    if not (further and is_told and rest.is_four_legged(shaped)):
+        return mapping
+    hip, shoulder = (bones[shaped.joints[joint][0]].head for joint in ("hip_l", "shoulder_l"))
+    is_trunk = np.linalg.norm(shoulder - hip) > FOOT_REACH * size
+    return replace(mapping, soles=mapping.soles + further) if is_trunk else mapping
+
+
+def _gap(bones: RigBones, sole: SoleSource, others: Iterable[SoleSource]) -> float:
+    """The least distance between the ends of a sole's bones and those of others; infinite without any."""
+
+    def ends(of: SoleSource) -> list[Array]:
+        return [bones[bone].end(end) for bone in (of.bone, of.toe_bone) if bone for end in ("head", "tail")]
+
+    gaps = (np.linalg.norm(end - place) for other in others for end in ends(other) for place in ends(sole))
+    return float(min(gaps, default=np.inf))
 
 
 def _covers(bones: RigBones, skin: RigSkin, mapping: RigMapping) -> bool:

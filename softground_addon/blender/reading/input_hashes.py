@@ -79,6 +79,12 @@ def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
     )
 
 
+def of_envelope(bone: bpy.types.Bone) -> str:
+    """Size and weight of the envelope of a bone."""
+    size = bone.head_radius, bone.tail_radius, bone.envelope_distance, bone.envelope_weight
+    return f"{bone.name} {[f'{value:.6g}' for value in size]}"
+
+
 def of_shapes(obj: bpy.types.Object) -> str:
     """Hash of the deformers of a skin other than bones: shape keys and modifiers; empty without any."""
     texts = [text for modifier in obj.modifiers if modifier.type != "ARMATURE" for text in of_settings(modifier)]

@@ -22,11 +22,12 @@ from ..ground.still_ground import mover_of
 from ..plants import trampling_table
 from ..playback import playback, weather_modifier
 from ..playback.own_data import BUILD_STAMP
+from ..rigs.carried import held_with
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.worn_rigs import worn_rigs
 from ..sampling.body_sampling import meshes_of
 from ..sampling.sampling_scene import object_named
-from ..sampling.skin_sampling import meshes_on
+from ..sampling.skin_sampling import enveloping, meshes_on
 from ..translation import translated
 from . import input_hashes
 
@@ -332,18 +333,21 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
     for obj in _props_of(character):
         modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
         parts.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
-    rig: dict[bpy.types.ID, str] = {}
-    if character.armature:
-        rig[settings.resolve(character.armature)] = ""  # it is compared by itself
+    body = settings.resolve(character.armature) if character.armature else None
+    rigs = [body, *worn_rigs(objects, body)] if body else []
     for worn in _worn_by(objects, character):
-        held = [text for each in worn.constraints if rig for text in input_hashes.of_settings(each, (), dict(rig))]
+        nodes = next(filter(None, (held_with(worn, rig) for rig in rigs)), [worn])
+        known: input_hashes.Known = dict.fromkeys(rigs[:1], "")  # it is compared by itself
+        held = (each for node in nodes if rigs for each in node.constraints)
+        texts = [text for each in held for text in input_hashes.of_settings(each, (), dict(known))]
+        texts += [input_hashes.of_envelope(bone) for rig in rigs for bone in enveloping(worn, rig)]
         parts.append(
-            f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} "
-            f"{input_hashes.of_place([worn])}{input_hashes.of_shapes(worn)}{' '.join(held)}"
+            f"{_of_mesh(worn)} {nodes[-1].parent_bone} {input_hashes.of_weights(worn, bones)} "
+            f"{input_hashes.of_place(nodes)}{input_hashes.of_shapes(worn)}{' '.join(texts)}"
         )
-    if character.armature:
-        rigs = worn_rigs(objects, settings.resolve(character.armature))
-        parts += [f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place([rig])}" for rig in rigs]
+    for rig in rigs[1:]:
+        nodes = held_with(rig, rigs[0]) or [rig]
+        parts.append(f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place(nodes)}")
     return input_hashes.joined(sorted(parts))
 
 

@@ -1,4 +1,4 @@
-"""Objects that the bones of a rig carry: they hang on one, as children or by a constraint."""
+"""Objects that the bones of a rig carry: they hang on one, as children or by a constraint, or on what does."""
 
 from __future__ import annotations
 
@@ -20,15 +20,37 @@ FULL = 0.5
 
 def carrier_of(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     """The bone of an armature that carries an object which does not move by itself, and its place at rest."""
-    parent = obj.parent
-    if parent == armature and obj.parent_type == "BONE":
+    carried = None
+    for node in reversed(held_with(obj, armature)):
+        in_parent = np.array(node.matrix_parent_inverse @ node.matrix_basis)
+        carried = (carried[0], carried[1] @ in_parent) if carried else _hung(node, armature)
+    return carried
+
+
+def held_with(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """An object and those above it, up to the one that a bone carries; empty where none does."""
+    if _hung(obj, armature):
+        return [obj]
+    parent = obj.parent if obj.parent_type == "OBJECT" else None
+    if parent is None or parent.type == "ARMATURE" or _active(obj) or obj.find_armature():
+        return []
+    above = held_with(parent, armature)
+    return [obj, *above] if above and not _is_keyed(obj) else []
+
+
+def _hung(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
+    """The bone on which an object itself hangs, or that it follows."""
+    if obj.parent == armature and obj.parent_type == "BONE":
         bone = armature.data.bones.get(obj.parent_bone)
-        return (bone.name, on_bone(obj, bone)) if bone else None
-    is_held = not obj.animation_data and any(not constraint.mute for constraint in obj.constraints)
-    return _held(obj, armature) if is_held else None
+        return (bone.name, _on_bone(obj, bone)) if bone else None
+    return _held(obj, armature) if _active(obj) and not _is_keyed(obj) else None
 
 
-def on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
+def _active(obj: bpy.types.Object) -> list[bpy.types.Constraint]:
+    return [constraint for constraint in obj.constraints if not constraint.mute]
+
+
+def _on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
     """The place of an object that hangs on a bone, in the space of the bone's armature at rest, (4, 4)."""
     parent = np.eye(4)
     if not bone.use_relative_parent:
@@ -39,7 +61,7 @@ def on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
 
 def _held(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     """The same of an object that follows a bone by its only constraint."""
-    (constraint, *others), own = (each for each in obj.constraints if not each.mute), np.array(obj.matrix_basis)
+    (constraint, *others), own = _active(obj), np.array(obj.matrix_basis)
     each: Any = constraint
     target: Any = each
     if each.type == "ARMATURE":
@@ -60,5 +82,9 @@ def _held(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
 
 def _stands(armature: bpy.types.Object) -> bool:
     """True if an armature stays where it is as an object."""
-    moved = (path.partition("[")[0] for path, _ in animated_paths(armature))
-    return armature.parent is None and not armature.constraints and set(moved) <= {"pose.bones"}
+    return armature.parent is None and not armature.constraints and not _is_keyed(armature)
+
+
+def _is_keyed(obj: bpy.types.Object) -> bool:
+    """True if keys, strips or drivers set anything of an object but its bones."""
+    return not {path.partition("[")[0] for path, _ in animated_paths(obj)} <= {"pose.bones"}

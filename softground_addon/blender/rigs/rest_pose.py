@@ -80,14 +80,20 @@ class _Skeleton:
         return path[::-1]
 
 
-def map_by_rest_pose(armature: bpy.types.Object, *, posed: bool = False) -> tuple[Joints, Feet] | None:
+def map_by_rest_pose(
+    armature: bpy.types.Object, *, posed: bool = False, skinned: bool = True
+) -> tuple[Joints, Feet] | None:
     """Joints and feet (name, side, bone, toe bone) from the rest pose, or None where no pair of legs shows.
 
     Steering bones are left out: where some bones deform, only those count. If `posed`, the current pose is looked at in
-    place of the rest pose.
+    place of the rest pose. Feet may hang elsewhere than on their legs where no skin shows what stands.
     """
     skeleton = _read_skeleton(armature, posed=posed)
     pairs = _mirrored_legs(skeleton)
+    if not skinned:
+        pairs = [
+            _with_free_feet(skeleton, pair, {bone for legs in pairs for leg in legs for bone in leg}) for pair in pairs
+        ]
     if not pairs:
         return None
     forward = _forward(skeleton, pairs)
@@ -252,6 +258,18 @@ def _mirrored_legs(skeleton: _Skeleton) -> list[_Pair]:
     lowest = np.minimum(skeleton.heads[:, 2], skeleton.tails[:, 2])
     chains = [skeleton.chain(leaf) for leaf in skeleton.leaves if lowest[leaf] < limit]
     return _one_per_limb(skeleton, _mirrored_pairs(skeleton, chains))
+
+
+def _with_free_feet(skeleton: _Skeleton, pair: _Pair, taken: set[int]) -> _Pair:
+    """Legs with the bones that begin where they end, and reach lower; themselves where not both have one."""
+    feet = []
+    for leg in pair:
+        end = skeleton.tails[leg[-1]]
+        gap = np.linalg.norm(skeleton.heads - end, axis=1)
+        gap[[*taken]] = np.inf
+        gap[skeleton.tails[:, 2] >= end[2]] = np.inf
+        feet += [int(gap.argmin())] if gap.min() < _MIRROR_TOLERANCE * skeleton.height else []
+    return ([*pair[0], feet[0]], [*pair[1], feet[1]]) if len({*feet}) == 2 else pair
 
 
 def _mirrored_pairs(skeleton: _Skeleton, chains: Sequence[list[int]]) -> list[_Pair]:

@@ -25,7 +25,7 @@ CHOOSE_CONTACTS = (
 """Remedy if no feet are found."""
 
 
-def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = True) -> RigMapping:
+def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = True, skinned: bool = True) -> RigMapping:
     """Joints and feet of an armature.
 
     Parameters
@@ -36,6 +36,8 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = Tr
         True if the current pose stands in for the rest pose.
     named : bool
         False if the names say nothing.
+    skinned : bool
+        False if it has no skin, so that bones alone tell where its legs end.
 
     Returns
     -------
@@ -50,7 +52,7 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = Tr
     deforming = {bone.name for bone in armature.data.bones if bone.use_deform}
     mapping = map_by_names(rest_bones(armature), deforming) if named else None
     if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
-        shape = map_by_rest_pose(armature, posed=posed)
+        shape = map_by_rest_pose(armature, posed=posed, skinned=skinned)
         if shape is not None:
             joints, feet = shape
             by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")

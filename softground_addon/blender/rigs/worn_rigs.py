@@ -8,10 +8,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.numerics.arrays import Array
 from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
+from .carried import Carried, carrier_of
 
 Lead = tuple[bpy.types.Object, str]
 """An armature and a bone of it that others follow."""
@@ -29,9 +29,15 @@ def worn_rigs(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object
     return [obj for obj in objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
 
 
-def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> str:
-    """The bone of a body on which a rig hangs as an object; empty for none."""
-    return _leads(body, rig).get((rig.parent, rig.parent_bone), "") if rig.parent and rig.parent_type == "BONE" else ""
+def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> Carried | None:
+    """The bone of a body on which a rig hangs as an object, and its place in the body's space at rest."""
+    leads = _leads(body, rig)
+    for leader in dict.fromkeys(leader for leader, _ in leads):
+        bone, place = carrier_of(rig, leader) or ("", np.eye(4))
+        if name := leads.get((leader, bone)):
+            lies = body.data.bones[name].matrix_local @ leader.data.bones[bone].matrix_local.inverted()
+            return name, np.asarray(np.array(lies) @ place)
+    return None
 
 
 def _wears(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
@@ -73,7 +79,7 @@ def _held(bone: bpy.types.PoseBone, leads: Collection[Lead]) -> tuple[str, Lead]
     return next((held for held in _followed(bone) if held[0] in _HOLDS and held[1] in leads), None)
 
 
-def carriers(rig: bpy.types.Object, body: bpy.types.Object) -> dict[str, tuple[str, Array]]:
+def carriers(rig: bpy.types.Object, body: bpy.types.Object) -> dict[str, Carried]:
     """The bone of a body that carries each bone of a rig that it wears, and the matrix (4, 4) from the rig's space into
     the body's, both at rest.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.numerics.arrays import Array, Indices
 from ...core.numerics.slices import Slices, sliced
+from ...core.rig.bones import envelope
 from ...core.rig.rig_skin import RigSkin, Shape
 from .. import mesh_arrays
 from ..placement import beside
-from ..rigs.carried import carrier_of, on_bone
+from ..rigs.carried import carrier_of
 from ..rigs.libraries import check_libraries
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
 from ..settings import ObjectName, Objects, name_of, resolve
@@ -52,7 +54,8 @@ def left_out_on(objects: Objects, armature: bpy.types.Object, bones: Collection[
 
 def _is_on(obj: bpy.types.Object, armature: bpy.types.Object, bones: Collection[str]) -> bool:
     carried = carrier_of(obj, armature)
-    return bool(carried and carried[0] in bones) or bool({group.name for group in obj.vertex_groups} & set(bones))
+    holding = {group.name for group in obj.vertex_groups} | {bone.name for bone in enveloping(obj, armature)}
+    return bool(carried and carried[0] in bones) or bool(holding & set(bones))
 
 
 def _worn_by(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
@@ -67,9 +70,7 @@ def _wears(armature: bpy.types.Object, obj: bpy.types.Object) -> bool:
 
 
 def _deformed_by(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
-    return any(m.type == "ARMATURE" and m.object == armature for m in obj.modifiers) or (
-        obj.parent == armature and obj.parent_type == "ARMATURE"
-    )
+    return bool(_modifiers(obj, armature)) or (obj.parent == armature and obj.parent_type == "ARMATURE")
 
 
 def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
@@ -109,7 +110,7 @@ def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | 
         yield
     if not pieces:
         return None
-    pieces = _shod(pieces, np.array(resolve(body).matrix_world)[2, :3])
+    pieces = _shod(pieces, resolve(body))
     bones = tuple(dict.fromkeys(name for piece in pieces for name in piece.names))
     place = {name: number for number, name in enumerate(bones)}
     first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
@@ -146,18 +147,22 @@ class _Piece:
     hung: bool = False
 
 
-def _shod(pieces: list[_Piece], up: Array) -> list[_Piece]:
-    """Meshes, where what hangs on bones lower than all that is deformed is no prop, but shoes or hooves."""
+def _shod(pieces: list[_Piece], armature: bpy.types.Object) -> list[_Piece]:
+    """Meshes, where what hangs below bones of the skin, and lower than all that is deformed, is no prop, but shoes."""
+    up, bones = np.array(armature.matrix_world)[2, :3], armature.data.bones
     heights = [piece.vertices @ up if len(piece.vertices) else np.full(1, np.inf) for piece in pieces]
     deformed = np.concatenate([[], *(height for height, piece in zip(heights, pieces, strict=True) if not piece.hung)])
     deformed = deformed[np.isfinite(deformed)]
     if not len(deformed):
         return pieces
     low, top = deformed.min(), deformed.min() + SHOD * np.ptp(deformed)
-    return [
-        replace(piece, hung=piece.hung and bool(height.min() > low or height.max() > top))
-        for height, piece in zip(heights, pieces, strict=True)
-    ]
+    clothed = {name for piece in pieces if not piece.hung for name in piece.names}
+
+    def is_prop(piece: _Piece, height: Array) -> bool:
+        below = piece.hung and any(parent.name in clothed for parent in bones[piece.names[0]].parent_recursive)
+        return piece.hung and bool(not below or height.min() > low or height.max() > top)
+
+    return [replace(piece, hung=is_prop(piece, height)) for height, piece in zip(heights, pieces, strict=True)]
 
 
 def mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
@@ -186,8 +191,8 @@ def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape
 
 def _carried(piece: _Piece, rig: bpy.types.Object, body: bpy.types.Object) -> _Piece:
     """A mesh on a rig that a body wears, as one on the body's bones that carry it."""
-    name, held = hung_on(rig, body), carriers(rig, body)
-    rest = (name, on_bone(rig, body.data.bones[name])) if name else next(iter(held.values()))
+    held = carriers(rig, body)
+    rest = hung_on(rig, body) or next(iter(held.values()))
     names, matrices = zip(*(held.get(name, rest) for name in piece.names), strict=True) if piece.names else ((), ())
     bones, number = np.unique(np.array(names, dtype=str), return_inverse=True)
     to_body = np.array([*matrices, rest[1]])
@@ -220,14 +225,19 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
     names = tuple(group.name for group in obj.vertex_groups)
     if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
         raise InputError(f"'{obj.name}' was changed while it was read: try again.")
-    deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])[group]
+    by_groups = all(modifier.use_vertex_groups for modifier in _modifiers(resolve(placed), armature))
+    deforms = np.array([by_groups and name in bones and bones[name].use_deform for name in names] or [False])[group]
     vertex, group, weight = vertex[deforms], group[deforms], weight[deforms]
+    to_armature = beside(resolve(placed), armature)
+    points = _moved(to_armature, mesh_arrays.positions(mesh))
+    envelopes = enveloping(resolve(placed), armature)
+    vertex, group, weight = _with_envelopes(envelopes, points, vertex, group + len(envelopes), weight)
+    names = (*(bone.name for bone in envelopes), *names)
     used, group = np.unique(group, return_inverse=True)
     total = np.bincount(vertex, weight, count)
     held = total[vertex] > _LEAST_WEIGHT
-    to_armature = beside(resolve(placed), armature)
     return _Piece(
-        _moved(to_armature, mesh_arrays.positions(mesh)),
+        points,
         mesh_arrays.triangles(mesh),
         tuple(names[number] for number in used),
         vertex[held],
@@ -235,6 +245,31 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
         weight[held] / total[vertex[held]],
         _turned(to_armature, shapes),
     )
+
+
+def enveloping(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.types.Bone]:
+    """The bones of an armature whose envelopes move what no vertex group holds of a mesh."""
+    by_parent = obj.parent == armature and obj.parent_type == "ARMATURE"
+    deforms = any([modifier.use_bone_envelopes for modifier in _modifiers(obj, armature)] or [by_parent])
+    return [bone for bone in armature.data.bones if bone.use_deform and deforms]
+
+
+def _modifiers(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    deforming: list[Any] = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]
+    return deforming
+
+
+def _with_envelopes(
+    bones: list[bpy.types.Bone], points: Array, vertex: Indices, group: Indices, weight: Array
+) -> tuple[Indices, Indices, Array]:
+    """Vertex, group and weight of each weight, with those of envelopes on vertices (V, 3) that no group holds."""
+    free = np.setdiff1d(np.arange(len(points)), vertex)
+    for number, bone in enumerate(bones):
+        ends, radii = np.array([bone.head_local, bone.tail_local]), (bone.head_radius, bone.tail_radius)
+        inside = bone.envelope_weight * envelope(points[free], ends, radii, bone.envelope_distance)
+        vertex, weight = np.append(vertex, free[inside > 0]), np.append(weight, inside[inside > 0])
+        group = np.append(group, np.full(len(vertex) - len(group), number))
+    return vertex, group, weight
 
 
 def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:

@@ -13,7 +13,8 @@ LONGEST_TRACK = 8.0
 """Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
 
 LONGEST_SLIDE = 0.25
-"""How far a foot slides within one print, in body heights: further on, it is another place that it prints, ..."""
+"""How far a foot slides within one print, in body heights, or its own length if that is more, as of what crawls: then
+it is another place that it prints, ..."""
 SHORTEST_SLIDE = 0.08
 """... if it takes as long for it [s]."""
 
@@ -32,7 +33,7 @@ def tracks(character: estimate.CharacterLoads, index: int) -> Iterator[slice]:
     motion = character.motion
     sole, skin = motion.soles[index], motion.skin
     prop, place = sole.sole.prop, sole.transforms[:, 0, :2, 3]
-    furthest = LONGEST_SLIDE * skin.height if skin else np.inf
+    furthest = max(LONGEST_SLIDE * skin.height, sole.sole.length) if skin else np.inf
     shortest = SHORTEST_SLIDE / motion.time_step
     for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
         if prop is not None and not prop.give:

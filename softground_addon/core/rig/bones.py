@@ -77,3 +77,28 @@ def family(bones: RigBones, name: str, ends: Set[str] = frozenset()) -> frozense
         if name in chain and ends.isdisjoint(chain[: chain.index(name)]):
             members.add(other)
     return frozenset(members)
+
+
+def envelope(points: Array, ends: Array, radii: tuple[float, float], distance: float) -> Array:
+    """Weights (N,) that the envelope of a bone has on points (N, 3): 1 within its radii, and down to 0 at a distance
+    beyond them, as Blender's armature deformation has them.
+
+    Parameters
+    ----------
+    ends : (2, 3) float array
+        Head and tail.
+    radii : (float, float)
+        Of the envelope there.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = np.array([(0.1, 0.0, 0.5), (0.2, 0.0, 0.5), (0.0, 0.0, -0.3)])
+    >>> envelope(points, np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]), (0.1, 0.1), 0.2).round(6).tolist()
+    [1.0, 0.75, 0.0]
+    """
+    along = ends[1] - ends[0]
+    share = np.clip((points - ends[0]) @ along / max(along @ along, np.finfo(float).tiny), 0.0, 1.0)
+    gap = np.linalg.norm(points - ends[0] - share[:, None] * along, axis=1)
+    gap -= radii[0] + share * (radii[1] - radii[0])
+    return np.clip(1.0 - np.square(np.maximum(gap, 0.0) / max(distance, np.finfo(float).tiny)), 0.0, 1.0)

@@ -133,9 +133,10 @@ def _bones_of(bones: RigBones, source: SoleSource, mapping: RigMapping) -> froze
 def _standing(
     followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[np.bool_], floor: NDArray[np.float64]
 ) -> int:
-    """The sample at which most of some parts' points are near the ground while they bear."""
+    """The sample at which most of some parts' points are nearest to the ground while they bear: a foot that leans on an
+    edge has more of them about as low, and none flat on it."""
     height = followed.motion.positions[:, parts[followed.motion.part], 2] - floor[:, None]
-    near = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=1)
+    near = np.clip(1.0 - np.abs(height) / (UNDERSIDE * followed.motion.height), 0.0, None).sum(axis=1)
     return int(np.where(bears, near, -1).argmax())
 
 

@@ -117,7 +117,8 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
     calm = _calm(tracks) * agrees
     weight = calm * np.clip(1 - (tracks.low - lowest[:, None]) / REACH, 0.0, None)
     lies, sinks = _at(0.0, tracks) * calm > WORTH, (tracks.low < -TOUCH) & (calm > WORTH)
-    if lies[0].sum() > max(sinks[0].sum(), 1):
+    deep = tracks.low[0][sinks[0]]  # arms hang through a floor each to a depth of its own
+    if lies[0].sum() > (np.abs(np.subtract.outer(deep, deep)) < BIN).sum(axis=1).max(initial=1):
         weight = np.where(lies, calm, weight)  # also where arms that hang through the floor are lower
     if not weight.any():
         return float(np.percentile(lowest, OFTEN)), 0.0

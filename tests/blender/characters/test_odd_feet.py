@@ -3,14 +3,18 @@
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Euler, Matrix
 
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.jobs import run
 from softground_addon.blender.reading import staleness
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
+from softground_addon.blender.rigs.carried import carrier_of
+from softground_addon.blender.rigs.rig_mapping import rest_bones
+from softground_addon.blender.sampling.rig_recording import record
 from softground_addon.blender.sampling.skin_sampling import read_skin
-from softground_addon.blender.settings import character_of
+from softground_addon.blender.settings import character_of, units_of
+from softground_addon.core.rig.rig_skin import of_body
 from tests.blender import rigs
 
 STRIDE, FRAMES = 0.8, 97
@@ -76,7 +80,7 @@ def test_a_foot_on_several_bones_is_one_contact(scene, foot):
     assert {part for sole in character.soles for part, _ in sole.parts.items()} == skinned
 
 
-@pytest.mark.parametrize("how", ["BONE", "CHILD_OF", "ARMATURE", "COPY_TRANSFORMS"])
+@pytest.mark.parametrize("how", ["BONE", "on an empty", "CHILD_OF", "ARMATURE", "COPY_TRANSFORMS"])
 def test_what_follows_a_bone_by_a_constraint_is_skin_as_what_hangs_on_it(scene, how):
     """As shoes, or the rigid parts of a robot."""
     armature = robot("one")
@@ -86,10 +90,16 @@ def test_what_follows_a_bone_by_a_constraint_is_skin_as_what_hangs_on_it(scene, 
         leg.modifiers.clear()
         leg.vertex_groups.clear()
         leg.parent = None
-        if how == "BONE":
-            leg.parent, leg.parent_type, leg.parent_bone = armature, "BONE", bone.name
+        leg.animation_data_create()  # empty, as by a look at the drivers
+        if how in ("BONE", "on an empty"):
+            hung = leg if how == "BONE" else bpy.data.objects.new(f"{leg.name} node", None)
+            hung.parent, hung.parent_type, hung.parent_bone = armature, "BONE", bone.name
             tail = bone.matrix_local @ Matrix.Translation((0, bone.length, 0))
-            leg.matrix_parent_inverse = tail.inverted()
+            hung.matrix_parent_inverse = tail.inverted()
+            if hung != leg:  # as of nodes between a bone and its mesh, with a place and a scale of their own
+                hung.matrix_basis = Matrix.LocRotScale((0.3, 0.2, -0.1), Euler((0.4, 0.5, 0.6)), (0.5, 0.5, 0.5))
+                leg.parent = hung
+                leg.matrix_basis = hung.matrix_basis.inverted()
             continue
         constraint = leg.constraints.new(how)
         target = constraint.targets.new() if how == "ARMATURE" else constraint
@@ -109,9 +119,58 @@ def test_what_follows_a_bone_by_a_constraint_is_skin_as_what_hangs_on_it(scene, 
     leg = bpy.data.objects["leg"]
     if how == "CHILD_OF":
         leg.constraints[0].inverse_matrix.translation.x += 0.1
+    elif how == "on an empty":
+        leg.parent.location.x += 0.1
     else:
         leg.data.vertices[0].co.x += 0.1
     assert staleness._of_body(scene.objects, wanted) != before
+
+
+def test_a_robot_of_rigid_parts_is_its_body_though_its_hands_are_deformed(scene):
+    """A trunk that reaches lower than they do is no shoe, and a head above it no hat."""
+    bones = {"Root": ((0, 0, 0), (0, 0.2, 0)), "Body": ((0, 0, 1), (0, 0, 1.6)), "Head": ((0, 0, 1.6), (0, 0, 2))}
+    bones |= {"Hand": ((0.4, 0, 1.2), (0.4, 0, 0.9)), "Foot": ((0, 0, 0.1), (0, -0.1, 0.1))}
+    armature = rigs.build("Robot", bones, {"Body": "Root", "Foot": "Root", "Head": "Body", "Hand": "Body"})
+    slab("hand", (0.35, -0.05, 0.7), (0.45, 0.05, 2.5), armature, "Hand")
+    slab("body", (-0.3, -0.15, 0.6), (0.3, 0.15, 1.1), armature, "Body")
+    slab("head", (-0.3, -0.3, 1.1), (0.3, 0.3, 1.9), armature, "Head")
+    slab("foot", (-0.3, -0.3, 0), (0.3, 0.3, 0.2), armature, "Foot")
+    for part in ("body", "head", "foot"):
+        obj = bpy.data.objects[part]
+        bone = armature.data.bones[obj.vertex_groups[0].name]
+        obj.modifiers.clear()
+        obj.parent_type, obj.parent_bone = "BONE", bone.name
+        obj.matrix_parent_inverse = (bone.matrix_local @ Matrix.Translation((0, bone.length, 0))).inverted()
+    skin = read_skin(scene.objects, armature)
+    recording = run_reading(record(scene, armature, range(1, 3), skin.bones, units_of(scene)))
+    assert of_body(skin, rest_bones(armature), recording).all()
+
+
+def run_reading(reading):
+    """What a generator returns."""
+    try:
+        while True:
+            next(reading)
+    except StopIteration as done:
+        return done.value
+
+
+def test_what_moves_by_itself_on_a_bone_or_is_deformed_by_another_rig_hangs_on_none(scene):
+    armature = robot("one")
+    leg = bpy.data.objects["leg"]
+    node = bpy.data.objects.new("Node", None)
+    node.parent, node.parent_type, node.parent_bone = armature, "BONE", leg.vertex_groups[0].name
+    other = bpy.data.objects.new("Other", armature.data.copy())
+    leg.modifiers.clear()
+    leg.parent = node
+    assert carrier_of(leg, armature)
+    leg.modifiers.new("Armature", "ARMATURE").object = other
+    assert not carrier_of(leg, armature)
+    leg.modifiers.clear()
+    node.animation_data_create()
+    assert carrier_of(leg, armature)
+    leg.keyframe_insert("location", frame=1)
+    assert not carrier_of(leg, armature)
 
 
 def test_a_mesh_that_hangs_on_another_bone_is_another_though_the_rig_stands_under_an_empty(scene):

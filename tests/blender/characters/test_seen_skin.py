@@ -70,7 +70,43 @@ def solid(body):
     thick_soles(body, 0.5)
 
 
-@pytest.mark.parametrize("shape", [thick_soles, keyed, driven, muted, mirrored, swollen, solid])
+def enveloped(body):
+    """Bound by the envelopes of bones alone."""
+    body.vertex_groups.clear()
+    body.modifiers[0].use_bone_envelopes = True
+    for bone in body.parent.data.bones:
+        bone.head_radius, bone.tail_radius, bone.envelope_distance = 0.06, 0.04, 0.1
+
+
+def without_groups(body):
+    """Its vertex groups are there and switched off."""
+    names = [group.name for group in body.vertex_groups]
+    enveloped(body)
+    for name in names:
+        body.vertex_groups.new(name=name).add(range(len(body.data.vertices)), 1.0, "REPLACE")
+    body.modifiers[0].use_vertex_groups = False
+
+
+def half_enveloped(body):
+    """By envelopes where it has no groups."""
+    body.parent.data.bones["shin.L"].envelope_weight = 3.0
+    body.modifiers[0].use_bone_envelopes = True
+    for name in ("shin.L", "foot.L", "head"):
+        body.vertex_groups.remove(body.vertex_groups[name])
+
+
+def parented(body):
+    """By being a child of the armature, without a modifier."""
+    half_enveloped(body)
+    body.modifiers.clear()
+    body.parent_type = "ARMATURE"
+
+
+SHAPES = [thick_soles, keyed, driven, muted, mirrored, swollen, solid]
+BOUND = [enveloped, without_groups, half_enveloped, parented]
+
+
+@pytest.mark.parametrize("shape", SHAPES + BOUND)
 def test_the_skin_that_is_read_is_the_skin_that_is_seen(scene, body, shape):
     shape(body)
     armature, before = body.parent, {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "scenes")}
@@ -107,6 +143,14 @@ def test_what_acts_on_the_posed_mesh_is_said_to_be_left_out(scene, body):
     body.modifiers.new("Suit", "CLOTH")
     hung = [finding.message for finding in shapes_left_out(scene.objects, snapshot(scene))]
     assert hung == [f"The skin of '{body.name}' was read without the modifier 'Suit'."]
+
+
+def test_an_envelope_of_another_size_makes_a_bake_outdated(scene, body):
+    enveloped(body)
+    bpy.ops.softground.add_character()
+    before = staleness._of_body(scene.objects, snapshot(scene).characters[0])
+    body.parent.data.bones["shin.L"].envelope_distance *= 2
+    assert staleness._of_body(scene.objects, snapshot(scene).characters[0]) != before
 
 
 @pytest.mark.parametrize("change", [thick_soles, keyed, swollen])

@@ -7,7 +7,7 @@ from mathutils import Matrix
 
 from softground_addon.blender.characters.selection import chosen, set_up_automatically
 from softground_addon.blender.reading.staleness import bodies_of
-from softground_addon.blender.rigs.worn_rigs import worn_rigs
+from softground_addon.blender.rigs.worn_rigs import hung_on, worn_rigs
 from softground_addon.blender.settings import snapshot
 from tests.blender import shots
 from tests.blender.grounds import bake
@@ -34,6 +34,14 @@ def copy_of(obj, name):
     copy.animation_data_clear()
     bpy.context.scene.collection.objects.link(copy)
     return copy
+
+
+def copy_of_place(obj):
+    """An empty that hangs where an object does."""
+    empty = bpy.data.objects.new("Node", None)
+    bpy.context.scene.collection.objects.link(empty)
+    empty.parent, empty.parent_type, empty.parent_bone = obj.parent, obj.parent_type, obj.parent_bone
+    return empty
 
 
 def following(leader, name, kind="COPY_TRANSFORMS", **values):
@@ -90,12 +98,19 @@ def test_shoes_on_a_rig_of_their_own_print_as_the_feet_of_the_body_do(scene, way
     assert shoes in bodies_of(scene.objects, snapshot(scene))
 
 
-def test_hair_on_a_bone_and_a_skirt_that_goes_along_are_worn_whatever_keys_move_the_hair(scene):
+@pytest.mark.parametrize("node", [False, True])
+def test_hair_on_a_bone_and_a_skirt_that_goes_along_are_worn_whatever_keys_move_the_hair(scene, node):
     walker = shots.walker(scene, frames=30)
     body = walker.children[0]
     hair, skirt = copy_of(walker, "Hair"), copy_of(walker, "Skirt")
     hair.parent, hair.parent_type, hair.parent_bone = walker, "BONE", walker.data.bones[-1].name
-    hair.keyframe_insert("rotation_euler", frame=1)
+    if node:  # an empty between the bone and the rig
+        between = hair.parent = copy_of_place(hair)
+        hair.parent_type = "OBJECT"
+        hair.pose.bones[0].keyframe_insert("rotation_quaternion", frame=1)
+        assert hung_on(hair, walker)[0] == between.parent_bone
+    else:
+        hair.keyframe_insert("rotation_euler", frame=1)
     follows = skirt.pose.bones[0].constraints.new("CHILD_OF")
     follows.target, follows.subtarget = walker, walker.data.bones[0].name
     for rig in (hair, skirt):

@@ -44,3 +44,9 @@ def test_a_foot_that_slides_fast_prints_no_shorter_than_it_may():
 def test_a_limb_that_slides_prints_as_a_foot_does_and_what_rolls_one_track(give, prints):
     ball = prop_sole(*sphere(0.1), name="ball", give=give)
     assert len(list(tracks(sliding(2.5 * LONGEST_SLIDE * HEIGHT, 0.0, sole=ball), 0))) == prints
+
+
+@pytest.mark.parametrize(("length", "prints"), [(0.3, 4), (0.6, 3), (1.7, 1)])
+def test_what_lies_long_on_the_ground_prints_again_no_sooner_than_its_length(length, prints):
+    """A snake is low: a quarter of its height is next to nothing."""
+    assert len(list(tracks(sliding(1.65, 0.0, sole=box_sole(length, 0.1)), 0))) == prints
