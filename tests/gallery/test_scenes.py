@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from gallery import scatters
 from gallery.make_all import HEROES
 from gallery.publish import LARGEST, PAGES, publish
 from sample_scenes.make_all import SCENES
@@ -66,6 +67,13 @@ def test_pictures_of_the_docs_and_small_scenes_are_published(tmp_path):
     assert published == {"craters.jpg", "bicycle.jpg", "craters.blend"}
     with Image.open(project / "docs" / "images" / "plot.png") as plot:
         assert (plot.mode, plot.convert("RGB").getpixel((2, 1))) == ("P", (10, 200, 30))
+
+
+def test_the_sheet_of_scatters_is_whole_and_small():
+    sheet = ROOT / "docs" / "images" / "scatters.jpg"
+    with Image.open(sheet) as picture:
+        assert picture.size == (sum(scatters.WIDTHS[0]), scatters.HEIGHT * len(scatters.WIDTHS))
+    assert sheet.stat().st_size <= scatters.LARGEST
 
 
 def test_scenes_in_the_repository_are_small():
