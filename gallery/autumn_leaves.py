@@ -55,16 +55,9 @@ def claims(built: Built) -> list[Claim]:
 
 def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, as a boot lifts off."""
-    scene, hiker = bpy.context.scene, bpy.data.objects["Hiker"]
-    step = built.bakes[PRESET].footprints[STEP]
-    outfit.wear_boots(hiker, Body())
-    outfit.wear_creased(hiker, Body())
-    for number, (name, (dark, light, share)) in enumerate(COLOURS.items()):
-        leaves = litter.leaves(dark, light, name=name, through=0.45)
-        for shader in leaves.objects[0].active_material.node_tree.nodes:
-            if shader.type == "BSDF_PRINCIPLED":
-                shader.inputs["Specular IOR Level"].default_value = 0.15
-        _let_fall(name, leaves, DENSITY * share, number)
+    scene, step = bpy.context.scene, built.bakes[PRESET].footprints[STEP]
+    dress(scene)
+    strew_leaves()
     for material in baked_ground.display_mesh_of(scene.softground.ground).data.materials:
         open_air.overgrow(material, "fallen", *MOULD)
     chance = np.random.default_rng(8)
@@ -75,23 +68,44 @@ def shoot(built: Built, folder: Path, samples: int) -> list[Path]:
     stage.go_to(scene, step.end_frame + AFTER)
     stage.aim(scene.camera, step.position + EYE, step.position + TARGET)
     scene.camera.data.dof.focus_distance = float(np.linalg.norm(EYE))
-    open_air.add_low_sun(scene, radians(36), radians(17), (1.0, 0.76, 0.52), 11.0, 0.34, open_air.PALE_DUSK)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 1.0, 86
+    scene.render.image_settings.quality = 86
     path = folder / "autumn_leaves.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
 
 
-def _let_fall(name: str, leaves: bpy.types.Collection, density: float, seed: int) -> None:
+def dress(scene: bpy.types.Scene) -> None:
+    """Evening sun, boots and trousers."""
+    hiker = bpy.data.objects["Hiker"]
+    outfit.wear_boots(hiker, Body())
+    outfit.wear_creased(hiker, Body())
+    open_air.add_low_sun(scene, radians(36), radians(17), (1.0, 0.76, 0.52), 11.0, 0.34, open_air.PALE_DUSK)
+    scene.view_settings.exposure = 1.0
+
+
+def strew_leaves() -> list[bpy.types.Object]:
+    """Leaves of all colours, which give way."""
+    fallen = []
+    for number, (name, (dark, light, share)) in enumerate(COLOURS.items()):
+        leaves = litter.leaves(dark, light, name=name, through=0.45)
+        for shader in leaves.objects[0].active_material.node_tree.nodes:
+            if shader.type == "BSDF_PRINCIPLED":
+                shader.inputs["Specular IOR Level"].default_value = 0.15
+        fallen.append(_let_fall(name, leaves, DENSITY * share, number))
+    return fallen
+
+
+def _let_fall(name: str, leaves: bpy.types.Collection, density: float, seed: int) -> bpy.types.Object:
     """Strew leaves on the undisturbed ground, as anybody may, and let them give way."""
     x, y = terrain.spaced(-4.0, 4.0, 0.1), terrain.spaced(-9.0, START + 1.0, 0.1)
     thin = {"share": _share}
     under = terrain.add_terrain(f"Under {name}", x, y, HEIGHT, "soil", bpy.context.scene.collection, thin)
     under.hide_render = under.hide_viewport = True
     how: dict[str, Any] = {"smallest": 0.045, "largest": 0.095, "law": 2.4, "lean": 0.45, "seed": seed}
-    strewn = litter.strew(under, leaves, density, where="share", **how)
+    strewn: bpy.types.Object = litter.strew(under, leaves, density, where="share", **how)
     production.make_active(strewn)
     bpy.ops.softground.give_way(kind="LITTER")
+    return strewn
 
 
 def _share(x: Array, y: Array) -> Array:

@@ -81,20 +81,20 @@ def ensure_group() -> Any:
     points = graph.store(strewn.outputs["Points"], PRESSED, pressed.outputs[0], True)
     down = graph.number(graph.attribute(PRESSED))
     size = _size(graph, chosen, seed)
-    sunk = (graph.number(chosen["Depth"]) + graph.number(chosen["Bury"]) * _random(graph, seed, 1) * down) * size
+    sunk = (graph.number(chosen["Depth"]) + graph.number(chosen["Bury"]) * random(graph, seed, 1) * down) * size
     offset = graph.combined(0.0, 0.0, (0.0 - sunk).socket)
     offset = graph.vector("ADD", graph.attribute("moved", "FLOAT_VECTOR"), offset)
     points = graph.forgotten(graph.put(points, True, position, offset), "moved")
 
-    upright = _random(graph, seed, 2) * graph.number(chosen["Lean"])
+    upright = random(graph, seed, 2) * graph.number(chosen["Lean"])
     lean = upright + (graph.number(chosen["Bend"]) - upright) * down
-    turn = graph.combined(lean.socket, 0.0, (_random(graph, seed, 3) * (2 * pi)).socket)
+    turn = graph.combined(lean.socket, 0.0, (random(graph, seed, 3) * (2 * pi)).socket)
     shapes = graph.node("GeometryNodeCollectionInfo")
     shapes.inputs["Separate Children"].default_value = shapes.inputs["Reset Children"].default_value = True
     graph.link(chosen["Pieces"], shapes.inputs["Collection"])
     placed = graph.node("GeometryNodeInstanceOnPoints")
     placed.inputs["Pick Instance"].default_value = True
-    pick = (_random(graph, seed, 4) * 1000.0).socket
+    pick = (random(graph, seed, 4) * 1000.0).socket
     for source, name in (
         (points, "Points"),
         (shapes.outputs[0], "Instance"),
@@ -107,7 +107,7 @@ def ensure_group() -> Any:
     return graph.tree
 
 
-def _random(graph: NodeGraph, seed: Any, number: int) -> Any:
+def random(graph: NodeGraph, seed: Any, number: int) -> Any:
     """A number from 0 to 1 for each piece."""
     node = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     graph.link(graph.math("ADD", seed, 100.0 * number), next(each for each in node.inputs if each.name == "Seed"))
@@ -118,7 +118,7 @@ def _size(graph: NodeGraph, chosen: Any, seed: Any) -> Any:
     """Sizes by a power law between the smallest and the largest [m]."""
     smallest, law = graph.number(chosen["Smallest"]), graph.number(chosen["Law"])
     ratio = graph.number(graph.math("POWER", (smallest / graph.number(chosen["Largest"])).socket, law.socket))
-    still = 1.0 - _random(graph, seed, 5) * (1.0 - ratio)
+    still = 1.0 - random(graph, seed, 5) * (1.0 - ratio)
     return smallest * graph.number(graph.math("POWER", still.socket, graph.math("DIVIDE", -1.0, law.socket)))
 
 

@@ -13,6 +13,7 @@ HEROES = (
     "snow_at_dusk",
     "meadow",
     "autumn_leaves",
+    "scatters",
     "path_after_rain",
     "tyre_and_boot",
     "dune_runner",

@@ -23,7 +23,8 @@ PRESET = "Soil"
 FRAMES = 190
 START = 1.2  # m along y; the walk is toward -y
 PICTURE = (1280, 720)
-EYE = (0.42, 1.45, 0.92)
+EYE, ASIDE = (0.42, 1.45, 0.92), -0.18
+"""Of the camera [m], and how far toward x it looks for each metre toward -y."""
 TUFTS, NEAREST, FARTHEST = 42_000, 0.9, 26.0
 """Tufts of grass, of which as many stand in each octave of distance from the camera [m]."""
 HEIGHT = open_air.rolling(swell=0.18, hills=18.0, seed=5)
@@ -43,27 +44,34 @@ def claims(built: Built) -> list[Claim]:
 
 def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     """From the height of a child, against the evening sun."""
-    scene = bpy.context.scene
-    open_air.add_low_sun(scene, radians(62), radians(13), (1.0, 0.74, 0.48), 10.0, 0.26, open_air.PALE_DUSK)
-    chance = np.random.default_rng(3)
-    grass = meadow.planted(_tufts(chance), chance, 1.0)
-    scene.collection.objects.link(grass)
-    _colour(grass)
-    production.make_active(grass)
-    bpy.ops.softground.give_way(kind="MEADOW")
-    for material in baked_ground.display_mesh_of(scene.softground.ground).data.materials:
-        open_air.overgrow(material, "growth", meadow.DARK, meadow.LIGHT)
+    scene, chance = bpy.context.scene, np.random.default_rng(3)
+    give_way(plant(tufts(chance, TUFTS, EYE, ASIDE), chance))
     spots = np.column_stack([chance.normal(0.0, 45.0, 90), -chance.uniform(38.0, 110.0, 90)])
     leaves = (0.030, 0.045, 0.010), (0.12, 0.14, 0.035)
     broadleaf.add_broadleaves(spots, chance.uniform(3.0, 8.0, 90), HEIGHT, *leaves, stem=0.15, seed=40)
-    hiker = bpy.data.objects["Hiker"]
-    outfit.wear_creased(hiker, Body())
-    outfit.wear_rucksack(hiker, Body())
+    dress(scene)
     scene.frame_set(scene.frame_end)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 1.2, 85
+    scene.render.image_settings.quality = 85
     path = folder / "meadow.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
+
+
+def give_way(grass: bpy.types.Object) -> None:
+    """Let grass give way by the button."""
+    production.make_active(grass)
+    bpy.ops.softground.give_way(kind="MEADOW")
+
+
+def dress(scene: bpy.types.Scene) -> None:
+    """Evening sun, green ground and clothes."""
+    open_air.add_low_sun(scene, radians(62), radians(13), (1.0, 0.74, 0.48), 10.0, 0.26, open_air.PALE_DUSK)
+    scene.view_settings.exposure = 1.2
+    for material in baked_ground.display_mesh_of(scene.softground.ground).data.materials:
+        open_air.overgrow(material, "growth", meadow.DARK, meadow.LIGHT)
+    hiker = bpy.data.objects["Hiker"]
+    outfit.wear_creased(hiker, Body())
+    outfit.wear_rucksack(hiker, Body())
 
 
 def _growth(x: Array, y: Array) -> Array:
@@ -71,16 +79,18 @@ def _growth(x: Array, y: Array) -> Array:
     return np.ones(np.broadcast(x, y).shape)
 
 
-def _tufts(chance: np.random.Generator) -> Array:
-    """Places of tufts before the camera, (N, 3) [m], ever fewer of a square metre with distance."""
-    away = np.geomspace(NEAREST, FARTHEST, TUFTS) * chance.uniform(0.95, 1.05, TUFTS)
-    turn = chance.uniform(radians(-48.0), radians(48.0), TUFTS)
-    x, y = EYE[0] - 0.18 * away + away * np.sin(turn), EYE[1] - away * np.cos(turn)
+def tufts(chance: np.random.Generator, count: int, eye: tuple[float, float, float], aside: float) -> Array:
+    """Places of tufts before a camera, (N, 3) [m], ever fewer of a square metre with distance."""
+    away = np.geomspace(NEAREST, FARTHEST, count) * chance.uniform(0.95, 1.05, count)
+    turn = chance.uniform(radians(-48.0), radians(48.0), count)
+    x, y = eye[0] + aside * away + away * np.sin(turn), eye[1] - away * np.cos(turn)
     return np.column_stack([x, y, HEIGHT(x, y)])
 
 
-def _colour(grass: bpy.types.Object) -> None:
-    """Let light through the blades."""
+def plant(spots: Array, chance: np.random.Generator) -> bpy.types.Object:
+    """Blades of the sample meadow in tufts at places (N, 3) [m]; light shines through them."""
+    grass = meadow.planted(spots, chance, 1.0)
+    bpy.context.scene.collection.objects.link(grass)
     tree = grass.data.materials[0].node_tree
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     shines, both = tree.nodes.new("ShaderNodeBsdfTranslucent"), tree.nodes.new("ShaderNodeMixShader")
@@ -89,6 +99,7 @@ def _colour(grass: bpy.types.Object) -> None:
     tree.links.new(shader.outputs[0], both.inputs[1])
     tree.links.new(shines.outputs[0], both.inputs[2])
     tree.links.new(both.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    return grass
 
 
 if __name__ == "__main__":

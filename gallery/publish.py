@@ -9,6 +9,8 @@ import re
 import shutil
 from pathlib import Path
 
+from PIL import Image
+
 from sample_scenes.make_all import SCENES
 from sample_scenes.production import OUTPUT
 
@@ -37,7 +39,16 @@ def publish(built: Path, root: Path) -> list[Path]:
     copies += [
         (blend, root / "sample_scenes") for blend in blends if blend.is_file() and blend.stat().st_size <= LARGEST
     ]
-    return [Path(shutil.copyfile(source, folder / source.name)) for source, folder in copies]
+    return [_put(source, folder / source.name) for source, folder in copies]
+
+
+def _put(source: Path, target: Path) -> Path:
+    """Copy a file; plots have 256 colours then, a third of their bytes."""
+    if source.suffix != ".png":
+        return Path(shutil.copyfile(source, target))
+    with Image.open(source) as plot:
+        plot.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(target, optimize=True)
+    return target
 
 
 if __name__ == "__main__":

@@ -101,16 +101,18 @@ def _follow_links(tokens: list[Token], source: str, pages: dict[str, str], sourc
 
 
 def _fitting(path: Path) -> tuple[str, bytes]:
-    """Name and content of a picture as pages show it: photographs and screenshots that are wider are smaller JPEGs."""
+    """Name and content of a picture as pages show it: what is wider is a smaller JPEG, unless that has more bytes."""
+    whole = path.read_bytes()
     if path.suffix not in (".png", ".jpg"):
-        return path.name, path.read_bytes()
+        return path.name, whole
     with Image.open(path) as image:
-        if image.mode != "RGB" or image.width <= WIDEST:
-            return path.name, path.read_bytes()
-        image.thumbnail((WIDEST, image.height), Image.Resampling.LANCZOS)
-        smaller = io.BytesIO()
-        image.save(smaller, "JPEG", quality=_QUALITY, optimize=True, progressive=True)
-    return f"{path.stem}.jpg", smaller.getvalue()
+        if image.mode not in ("RGB", "P") or image.width <= WIDEST:
+            return path.name, whole
+        shown = image.convert("RGB")
+    shown.thumbnail((WIDEST, shown.height), Image.Resampling.LANCZOS)
+    smaller = io.BytesIO()
+    shown.save(smaller, "JPEG", quality=_QUALITY, optimize=True, progressive=True)
+    return (f"{path.stem}.jpg", smaller.getvalue()) if smaller.tell() < len(whole) else (path.name, whole)
 
 
 def _follow(link: Token, source: str, pages: dict[str, str]) -> bool:

@@ -4,7 +4,9 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
+from gallery import scatters
 from gallery.make_all import HEROES
 from gallery.publish import LARGEST, PAGES, publish
 from sample_scenes.make_all import SCENES
@@ -50,7 +52,8 @@ def test_pictures_of_the_docs_and_small_scenes_are_published(tmp_path):
     for page in PAGES:
         (project / "docs" / page).write_text("")
     (project / "docs" / "gallery.md").write_text("![One](images/craters.jpg) ![Two](images/not_built.png)")
-    (project / "docs" / "figures.md").write_text("![Three](images/bicycle.jpg)")
+    (project / "docs" / "figures.md").write_text("![Three](images/bicycle.jpg) ![Four](images/plot.png)")
+    Image.new("RGBA", (4, 3), (10, 200, 30, 255)).save(built / "plot.png")
     for name, size in {
         "craters.jpg": 5,
         "bicycle.jpg": 5,
@@ -62,6 +65,15 @@ def test_pictures_of_the_docs_and_small_scenes_are_published(tmp_path):
     publish(built, project)
     published = {path.name for path in project.rglob("*") if path.suffix in (".jpg", ".blend")}
     assert published == {"craters.jpg", "bicycle.jpg", "craters.blend"}
+    with Image.open(project / "docs" / "images" / "plot.png") as plot:
+        assert (plot.mode, plot.convert("RGB").getpixel((2, 1))) == ("P", (10, 200, 30))
+
+
+def test_the_sheet_of_scatters_is_whole_and_small():
+    sheet = ROOT / "docs" / "images" / "scatters.jpg"
+    with Image.open(sheet) as picture:
+        assert picture.size == (sum(scatters.WIDTHS[0]), scatters.HEIGHT * len(scatters.WIDTHS))
+    assert sheet.stat().st_size <= scatters.LARGEST
 
 
 def test_scenes_in_the_repository_are_small():

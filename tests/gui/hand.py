@@ -136,6 +136,14 @@ class Hand:
         space.region_3d.view_rotation = Euler((1.05, 0.0, 0.9)).to_quaternion()
         yield 0.7
 
+    def look_at_prints(self, place: tuple[float, float, float], turn: float, distance: float) -> Steps:
+        """Look somewhat down at prints around a place, without what else the viewport draws over them."""
+        over, view = self.area().spaces.active.overlay, self.area().spaces.active.region_3d
+        over.show_outline_selected = over.show_floor = over.show_axis_x = over.show_axis_y = over.show_bones = False
+        view.view_perspective, view.view_location, view.view_distance = "PERSP", place, distance
+        view.view_rotation = Euler((1.05, 0.0, turn)).to_quaternion()
+        yield 0.7
+
     def show_wires(self) -> None:
         """What a story without pictures looks at: without a graphics card, light takes seconds to draw."""
         self.area().spaces.active.shading.type = "WIREFRAME"

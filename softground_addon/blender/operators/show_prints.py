@@ -107,7 +107,7 @@ def _show(prints: Sequence[baked_steps.BakedStep], area: Any, unit_scale: float)
     at = _in_view(middle)
     view.view_perspective = "PERSP"
     turn(area, at + Vector((0.0, 0.0, RAISED * distance)), look, distance)
-    _light(space.shading, look)
+    light(space.shading, look)
 
 
 def turn(area: Any, middle: Vector, look: float, distance: float) -> None:
@@ -130,7 +130,7 @@ def _hidden(area: Any) -> float:
     return float(width["UI"] / width["WINDOW"]) if overlaps and width["UI"] > 1 else 0.0
 
 
-def _light(shading: Any, look: float) -> None:
+def light(shading: Any, look: float) -> None:
     """Let a low sun rake over what Solid shading shows, from where a view looks to, if its light is Blender's own."""
     if shading.type != "SOLID":
         return

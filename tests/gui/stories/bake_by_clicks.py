@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bpy
-from mathutils import Euler
 
 from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
@@ -57,7 +56,10 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.move(*hand.middle())
     baked = fingerprints.of_file()
     if hand.for_docs:
-        yield from show_prints(hand)
+        place = scene().objects["Walker"].pose.bones["hips"].matrix.translation
+        hand.show_materials((0.21, 0.535))
+        yield from hand.look_at_prints((place.x - 0.25, place.y + 0.85, 0.2), 2.55, 2.5)
+        yield 25.0  # until its shaders are there
         yield from hand.picture("two_clicks")
         hand.area().spaces.active.shading.type = "SOLID"
 
@@ -86,19 +88,6 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.clear_bake")
     facts["cleared: deepest vertex"] = deepest()
-
-
-def show_prints(hand: Hand) -> Steps:
-    """The last prints and the feet in them, in low light."""
-    space, place = hand.area().spaces.active, scene().objects["Walker"].pose.bones["hips"].matrix.translation
-    over = space.overlay
-    over.show_outline_selected = over.show_floor = over.show_axis_x = over.show_axis_y = over.show_bones = False
-    hand.show_materials((0.21, 0.535))
-    view = space.region_3d
-    view.view_perspective, view.view_distance = "PERSP", 2.5
-    view.view_location = (place.x - 0.25, place.y + 0.85, 0.2)
-    view.view_rotation = Euler((1.05, 0.0, 2.55)).to_quaternion()
-    yield 25.0  # until its shaders are there
 
 
 def scene():

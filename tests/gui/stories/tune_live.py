@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import bpy
 import numpy as np
 
 from tests.blender import fingerprints
-from tests.gui.hand import Hand, Steps
+from tests.gui.hand import Hand, Steps, module
 from tests.gui.shot import open_walk
 from tests.gui.stories.interrupted_bake import with_viewport
 from tests.gui.stories.live_answers import on_new_ground, press_live
+
+TURN = 2.55
+"""Of the view about z [rad]: from behind the walker, and beside."""
 
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
@@ -58,20 +63,16 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 
     with_viewport(hand, bpy.ops.softground.overlay)
     facts["overlay"] = bpy.context.window_manager.softground.show_overlay
-    scene().frame_set(58)
-    yield from hand.look_at_walk()
-    yield from hand.picture("live")
+    yield from picture_of_steps(hand, 58, "live")
     scene().frame_set(96)
     yield 0.5
     yield from press_live(hand, offset=0.75)
     facts["kept"] = "softground_record" in scene().softground.ground.data
     facts["no longer live"] = not bpy.context.window_manager.softground.is_live
-    scene().frame_set(59)
-    yield from hand.look_at_walk()
     yield 1.0  # the overlay has the animation read as it is drawn
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield 1.5  # panels glide to their places
-    yield from hand.picture("overlay")
+    yield from picture_of_steps(hand, 59, "overlay")
     bpy.ops.softground.clear_bake()
     facts["cleared: as before"] = bool((heights() == before).all())
 
@@ -103,6 +104,15 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["disabled: no handlers"] = not [
         handler for handler in bpy.app.handlers.frame_change_post if "softground" in handler.__module__
     ]
+
+
+def picture_of_steps(hand: Hand, frame: int, name: str) -> Steps:
+    """The viewport at a frame, in the light of *Show Prints*: prints behind the walker, footfalls ahead."""
+    scene().frame_set(frame)
+    place = scene().objects["Walker"].pose.bones["hips"].matrix.translation
+    yield from hand.look_at_prints((place.x - 0.05, place.y + 0.65, 0.15), TURN, 2.5)
+    module("operators.show_prints").light(hand.area().spaces.active.shading, TURN + pi / 2)
+    yield from hand.picture(name, of="WINDOW")
 
 
 def scene():
