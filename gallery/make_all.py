@@ -12,6 +12,7 @@ from sample_scenes.make_all import build_all
 HEROES = (
     "snow_at_dusk",
     "meadow",
+    "through_meadow",
     "autumn_leaves",
     "scatters",
     "path_after_rain",

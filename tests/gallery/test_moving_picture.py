@@ -7,6 +7,7 @@ import bpy
 import pytest
 from PIL import Image
 
+from gallery import through_meadow
 from gallery.moving_picture import LARGEST, LAST_HOLD, PICTURE, SHOWN, animate, build
 from sample_scenes import production
 from softground_addon.blender import settings
@@ -35,6 +36,13 @@ def test_the_readme_begins_with_a_short_small_moving_picture():
     with Image.open(ROOT / first) as moving:
         assert (moving.size, moving.n_frames) == (PICTURE, len(SHOWN))
     assert 3.0 <= (len(SHOWN) - 1) / 12 + LAST_HOLD / 1000 <= 5.0
+
+
+def test_the_moving_picture_of_the_meadow_is_whole_and_small():
+    path = ROOT / "docs" / "images" / "through_meadow.webp"
+    with Image.open(path) as moving:
+        assert (moving.size, moving.n_frames) == (through_meadow.PICTURE, len(through_meadow.SHOWN))
+    assert path.stat().st_size <= through_meadow.LARGEST
 
 
 class BakeAskedError(Exception):
