@@ -21,6 +21,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
+from ..playback.weather_nodes import RAISED
 from . import litter_nodes, wind_nodes
 from .table_nodes import Table, any_of, at_element, in_cells, is_over, slot_of, table_of, turned
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
@@ -130,8 +131,9 @@ def _fill(graph: NodeGraph) -> None:
     graph.next_row()
     loose = _loose_parts_moved(graph, table, passes, geometry, position, sway)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
+    always = graph.either(table.is_windy.socket, graph.logic("NOT", table.sinks))  # snow may lift it
     acts = graph.both(
-        graph.either(table.is_windy.socket, graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket)),
+        graph.either(always, graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket)),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
     )
     graph.finish(graph.choose("GEOMETRY", acts, given, geometry))
@@ -248,10 +250,16 @@ def _given_way(
     place = in_cells(graph, table, root)
     found, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
     place = place.socket
+    snow = graph.number(
+        graph.choose("FLOAT", table.sinks, graph.attribute(RAISED), 0.0)
+    )  # that lifts what stands on it
+    is_lifted = snow.above(0.0)
+    is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, found, is_lifted.socket, domain), 0)
     is_near = graph.either(table.is_windy.socket, any_of(graph, found, is_over(graph, table, place), domain))
+    is_near = graph.either(is_near, is_any_lifted)
     latest = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place), "INT")
     found, (latest,) = graph.captured(found, graph.number(latest), kinds="INT", domain=domain)
-    is_touched = latest.above(0.5).at_least(table.is_windy).socket
+    is_touched = latest.above(0.5).at_least(table.is_windy).at_least(is_lifted).socket
     touched = any_of(graph, found, is_touched, domain)
 
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
@@ -278,7 +286,8 @@ def _given_way(
     height = graph.number(graph.dot(ground, beside))
     seen = height.at_most(0.0) + height.at_least(0.0) * chance.above(BURIED)
     height = graph.choose("FLOAT", table.stands, seen.socket, height.socket)
-    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, 0.0, height))
+    lowered = snow * table.metre * -1.0 / table.cell
+    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, lowered.socket, height))
     way = turned(graph, sent, table.to_scatter)
     shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
