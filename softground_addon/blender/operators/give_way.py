@@ -72,8 +72,7 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
     """Let objects give way to the prints of a ground."""
     renew_table(ground)
     table = trampling_table.ensure(ground)
-    for obj in chosen:
-        give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
+    give_way.put(chosen, kind, table, {baked_ground.display_mesh_of(ground)})
 
 
 def renew_table(ground: bpy.types.Object) -> None:
