@@ -10,7 +10,6 @@ from ..nodes.node_graph import NodeGraph, Number
 from .trampling_layout import META, THROWN_FROM, TILES, WIND
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_HIGHEST = 1e30
 NOWHERE = 1e9
 """More vertices than a table has: the last one is empty."""
 
@@ -104,15 +103,10 @@ def any_of(graph: NodeGraph, geometry: Any, condition: Any, domain: str) -> Any:
 
 
 def is_over(graph: NodeGraph, table: Table, place: Any) -> Any:
-    """True of places over the table."""
-    sizes = table.columns + 1.0, table.rows + 1.0
-    half = [(size * 0.5).socket for size in sizes]
-    apart = graph.vector("ABSOLUTE", graph.vector("SUBTRACT", place, graph.combined(*half)))
-    node = graph.node("FunctionNodeCompare", data_type="VECTOR", mode="ELEMENT", operation="LESS_THAN")
-    compared = [socket for socket in node.inputs if socket.type == "VECTOR"]
-    for socket, value in zip(compared, (apart, graph.combined(*half, _HIGHEST)), strict=True):
-        graph.link(value, socket)
-    return node.outputs["Result"]
+    """1 of places over the table, else 0."""
+    column, row = graph.parts(place)[:2]
+    beyond = (0.0 - column).at_least(column - table.columns).at_least((0.0 - row).at_least(row - table.rows))
+    return graph.compare("LESS_THAN", beyond.socket, 1.0)
 
 
 def in_cells(graph: NodeGraph, table: Table, root: Any) -> Any:
