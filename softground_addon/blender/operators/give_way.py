@@ -50,6 +50,10 @@ class SOFTGROUND_OT_give_way(Reading):
         linked = next((obj for obj in chosen if obj.library), None)
         if linked is not None:
             raise InputError(f"'{linked.name}' is linked from another file: give way there, or make it local.")
+        emitter = next((obj for obj in chosen if obj.particle_systems and not _scatters_by_nodes(obj)), None)
+        if emitter is not None:
+            remedy = "make them real (Object > Apply > Make Instances Real), or convert hair to curves."
+            raise InputError(f"'{emitter.name}' scatters particles, which no modifier moves: {remedy}")
         names = [settings.name_of(obj) for obj in (ground, *chosen)]
         yield from _grouped(ground)
         ground, *chosen = map(settings.resolve, names)
@@ -68,8 +72,7 @@ def _let(ground: bpy.types.Object, chosen: Sequence[bpy.types.Object], kind: str
     """Let objects give way to the prints of a ground."""
     renew_table(ground)
     table = trampling_table.ensure(ground)
-    for obj in chosen:
-        give_way.put(obj, kind, table, {baked_ground.display_mesh_of(ground)})
+    give_way.put(chosen, kind, table, {baked_ground.display_mesh_of(ground)})
 
 
 def renew_table(ground: bpy.types.Object) -> None:
@@ -89,7 +92,11 @@ def _may_give_way(obj: bpy.types.Object | None, ground: bpy.types.Object) -> boo
     if obj is None or obj.type not in give_way.SCATTERS:
         return False
     is_ground = obj in (ground, baked_ground.display_mesh_of(ground))
-    return not is_ground or any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
+    return not is_ground or _scatters_by_nodes(obj)
+
+
+def _scatters_by_nodes(obj: bpy.types.Object) -> bool:
+    return any(modifier.type == "NODES" for modifier in ground_mesh.users_modifiers(obj))
 
 
 class SOFTGROUND_OT_add_sample_meadow(Reading):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, cast
 
 import bpy
@@ -24,8 +24,12 @@ _TALL = 95
 """Percentile of heights that is taken for that of the scatter: a few that are taller pass for grass that is moved."""
 
 
-def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> Any:
-    """Have an object give way, behind its own modifiers; one that does gets the values of a preset.
+def put(
+    objects: Sequence[bpy.types.Object], kind: str, table: bpy.types.Object, grounds: Collection[bpy.types.Object]
+) -> None:
+    """Have objects give way, behind their own modifiers; those that do get the values of a preset.
+
+    All are measured first: after each change Blender evaluates them all anew.
 
     Parameters
     ----------
@@ -36,8 +40,17 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
     grounds : collection of bpy.types.Object
         The objects that show the prints.
     """
-    follows, instances = _follows(obj, grounds), _instances_of(obj)
-    height, unit_scale = _height_of(obj, instances), bpy.context.scene.unit_settings.scale_length
+    instances = _instances_of(objects)
+    heights = [_height_of(obj, instances[obj]) for obj in objects]
+    for obj, height in zip(objects, heights, strict=True):
+        is_loose = obj.type == "MESH" and obj not in grounds and not instances[obj]
+        _put(obj, kind, table, height, follows=_follows(obj, grounds), is_loose=is_loose)
+
+
+def _put(
+    obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: float, *, follows: bool, is_loose: bool
+) -> None:
+    unit_scale = bpy.context.scene.unit_settings.scale_length
     modifier = modifier_of(obj)
     if modifier is None:
         modifier = cast("Any", obj.modifiers.new(MODIFIER, "NODES"))
@@ -54,11 +67,10 @@ def put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, grounds: Coll
         "Stands": kind not in LITTER,
         "Rolls": LITTER.get(kind, 0.0) / unit_scale,
         "Sinks": not follows,
-        "Loose Parts": obj.type == "MESH" and obj not in grounds and not len(instances),
+        "Loose Parts": is_loose,
     }
     set_inputs(modifier, values)
     obj.update_tag()
-    return modifier
 
 
 def _follows(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> bool:
@@ -76,21 +88,21 @@ def _follows(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> bo
     return False
 
 
-def _instances_of(obj: bpy.types.Object) -> Any:
-    """Heights of the instances that an object makes, (N,) [Blender units]."""
+def _instances_of(objects: Sequence[bpy.types.Object]) -> dict[bpy.types.Object, list[float]]:
+    """Heights of the instances that each object makes [Blender units]."""
     graph = bpy.context.evaluated_depsgraph_get()
-    heights = []
+    heights: dict[bpy.types.Object, list[float]] = {obj: [] for obj in objects}
     for instance in graph.object_instances:
-        if instance.is_instance and instance.parent and instance.parent.original == obj:
+        if instance.is_instance and instance.parent and instance.parent.original in heights:
             shape = instance.instance_object
             top = max((corner[2] for corner in shape.bound_box), default=0.0) if shape.type in _SHAPES else 0.0
-            heights.append(top * instance.matrix_world.to_scale().z)
-    return np.array(heights)
+            heights[instance.parent.original].append(top * instance.matrix_world.to_scale().z)
+    return heights
 
 
-def _height_of(obj: bpy.types.Object, instances: Any) -> float:
+def _height_of(obj: bpy.types.Object, instances: Sequence[float]) -> float:
     """Height of what an object scatters [Blender units]; 0 where that cannot be told."""
-    if len(instances):
+    if instances:
         return float(np.percentile(instances, _TALL))
     scale = obj.matrix_world.to_scale().z
     if obj.type == "MESH":

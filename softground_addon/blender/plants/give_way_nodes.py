@@ -21,6 +21,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
+from ..playback.weather_nodes import RAISED
 from . import litter_nodes, wind_nodes
 from .table_nodes import Table, any_of, at_element, in_cells, is_over, slot_of, table_of, turned
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
@@ -33,8 +34,6 @@ MADE = "softground_give_way_made"
 _NUMBERS = ("VALUE", "INT", "VECTOR")
 _ROOT, _PART, _LOW = (f".softground_{name}" for name in ("root", "part", "low"))
 """Of the vertices of loose parts meanwhile."""
-_NOWHERE = 1e9
-"""More vertices than a table has."""
 
 INPUTS = (
     GroupInput("Table", None, "Where and when soles tread: an object that each bake writes", kind="Object"),
@@ -132,8 +131,9 @@ def _fill(graph: NodeGraph) -> None:
     graph.next_row()
     loose = _loose_parts_moved(graph, table, passes, geometry, position, sway)
     geometry = graph.choose("GEOMETRY", chosen["Loose Parts"], geometry, loose)
+    always = graph.either(table.is_windy.socket, graph.logic("NOT", table.sinks))  # snow may lift it
     acts = graph.both(
-        graph.either(table.is_windy.socket, graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket)),
+        graph.either(always, graph.compare("LESS_EQUAL", table.first_frame.socket, frame.socket)),
         graph.compare("LESS_THAN", 0.5, table.tile.socket),
     )
     graph.finish(graph.choose("GEOMETRY", acts, given, geometry))
@@ -148,7 +148,7 @@ class _Passes:
     counted : geometry
         The table, with what `latest` needs alone.
     latest : int
-        Of each slot, the latest pass that has begun, or `_NOWHERE`.
+        Of each slot, the latest pass that has begun; 0 without any.
     vertices : geometry
         The table, with what follows.
     lean, further : vectors
@@ -179,7 +179,7 @@ def _passes(graph: NodeGraph, table: Table, plant: Plant, frame: Number) -> _Pas
     following = at_element(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
     of_slot = [graph.number(at_element(graph, before.socket, at, "POINT", "INT")) for at in (first, following)]
     count = of_slot[1] - of_slot[0]
-    latest = graph.number(first) + count - 1.0 + (1.0 - count.above(0.5)) * _NOWHERE
+    latest = (graph.number(first) + count - 1.0) * count.above(0.5)
 
     start, end, passes = graph.parts(graph.attribute(TIMES, "FLOAT_VECTOR"))
     down, up, above = graph.parts(graph.attribute(PACE, "FLOAT_VECTOR"))
@@ -218,6 +218,7 @@ def _passes(graph: NodeGraph, table: Table, plant: Plant, frame: Number) -> _Pas
         shares.append(share)
     share = graph.combined(remain.socket, shares[0].socket, (shares[1] - shares[0]).socket)
     sent = litter_nodes.way(graph, table, by, plant.height, frame)
+    sent = graph.choose("VECTOR", table.stands, sent, (0.0, 0.0, 0.0))
     vectors = leans[0], graph.vector("SUBTRACT", leans[1], leans[0]), share, ground, sent
     vertices, captured = graph.captured(vertices, *map(graph.number, vectors), kinds="VECTOR")
     return _Passes(counted, latest.socket, vertices, *(number.socket for number in captured))
@@ -241,54 +242,60 @@ def _given_way(
     domain: str,
     root: Any,
     move: Callable[[Any, _Moved], Any],
-    sway: Callable[[list[Number], Number], Number],
+    sway: Callable[[Any, Number], Number],
     each: Any = None,
 ) -> Any:
     """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers, and no wind
     does."""
-    rooted, (root,) = graph.captured(geometry, graph.number(root), kinds="VECTOR", domain=domain)
-    place = in_cells(graph, table, root.socket)
-    is_near = graph.either(table.is_windy.socket, any_of(graph, rooted, is_over(graph, table, place), domain))
-    latest = graph.number(graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT"))
-    is_touched = (1.0 - latest.above(0.5 * _NOWHERE)).at_least(table.is_windy)
-    found, (latest, is_touched) = graph.captured(rooted, latest, is_touched, kinds=("INT", "BOOLEAN"), domain=domain)
-    touched = any_of(graph, found, is_touched.socket, domain)
+    place = in_cells(graph, table, root)
+    found, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
+    place = place.socket
+    snow = graph.number(
+        graph.choose("FLOAT", table.sinks, graph.attribute(RAISED), 0.0)
+    )  # that lifts what stands on it
+    is_lifted = snow.above(0.0)
+    is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, found, is_lifted.socket, domain), 0)
+    is_near = graph.either(table.is_windy.socket, any_of(graph, found, is_over(graph, table, place), domain))
+    is_near = graph.either(is_near, is_any_lifted)
+    latest = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place), "INT")
+    found, (latest,) = graph.captured(found, graph.number(latest), kinds="INT", domain=domain)
+    is_touched = latest.above(0.5).at_least(table.is_windy).at_least(is_lifted).socket
+    touched = any_of(graph, found, is_touched, domain)
 
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
-    place = in_cells(graph, table, root.socket)
-    sent = litter_nodes.sent_off(graph, passes, latest, chance, is_touched)
-    way_there = zip(place, graph.parts(sent), strict=False)
-    place = [graph.number(graph.choose("FLOAT", table.stands, (a + b).socket, a.socket)) for a, b in way_there]
-    acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place).socket, "INT")
+    sent_off, sent, there, acting = litter_nodes.sent_off(graph, table, passes, found, domain, place, latest, chance)
+    found = graph.choose("GEOMETRY", table.stands, sent_off, found)
     acting = graph.choose("INT", table.stands, acting, latest.socket)
+    place = graph.choose("VECTOR", table.stands, there, place)
     lean, further, share, ground = (
         graph.at_index(passes.vertices, value, acting)
         for value in (passes.lean, passes.further, passes.share, passes.ground)
     )
     remain, bent, bent_further = graph.parts(share)
     is_worn = chance.above(remain)
-    lean, bent = graph.vector("MULTIPLY_ADD", further, is_worn.socket, lean), bent + bent_further * is_worn
+    lean = graph.vector("ADD", graph.scaled(further, is_worn.socket), lean)
+    bent = bent + bent_further * is_worn
     swaying = sway(place, chance) * (1.0 - bent)
     swayed = wind_nodes.leaning(graph, table, swaying)
     lean = graph.choose("VECTOR", table.is_windy.socket, lean, graph.vector("ADD", lean, swayed))
     bent = (bent + swaying).at_most(1.0).where(table.is_windy, otherwise=bent)
-    beside = [part.fraction() - 0.5 for part in place]
-    slope_x, slope_y, level = graph.parts(ground)
-    height = level + slope_x * beside[0] + slope_y * beside[1]
+    beside = graph.vector("MULTIPLY_ADD", graph.vector("FRACTION", place), (1.0, 1.0, 0.0), (-0.5, -0.5, 1.0))
+    height = graph.number(graph.dot(ground, beside))
     seen = height.at_most(0.0) + height.at_least(0.0) * chance.above(BURIED)
     height = graph.choose("FLOAT", table.stands, seen.socket, height.socket)
-    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, 0.0, height))
+    lowered = snow * table.metre * -1.0 / table.cell
+    shift = graph.scaled(table.cell_up, graph.choose("FLOAT", table.sinks, lowered.socket, height))
     way = turned(graph, sent, table.to_scatter)
     shift = graph.choose("VECTOR", table.stands, graph.vector("ADD", shift, way), shift)
     if domain != "INSTANCE":
-        shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.dot(root.socket, table.up)))
+        shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.separated(place)[2]))
     fields = (graph.number(lean), graph.number(shift), bent)
     changed, captured = graph.captured(found, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
     lean, shift, bent = (number.socket for number in captured)
-    moved = _Moved(lean, shift, bent, is_touched.socket)
+    moved = _Moved(lean, shift, bent, is_touched)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
     moved_there = graph.choose("GEOMETRY", touched, geometry, move(changed, moved))
     return graph.choose("GEOMETRY", is_near, geometry, moved_there)
@@ -299,8 +306,8 @@ def _put(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _M
 
     All are moved, those that no sole has touched by nothing: to choose some takes longer.
     """
-    height = graph.dot(position, table.up)
-    return graph.put(geometry, True, offset=graph.vector("MULTIPLY_ADD", moved.lean, height, moved.shift))
+    turned_by = graph.scaled(moved.lean, graph.dot(position, table.up))
+    return graph.put(geometry, True, offset=graph.vector("ADD", turned_by, moved.shift))
 
 
 def _instances_moved(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
@@ -334,7 +341,7 @@ def _loose_parts_moved(
     passes: _Passes,
     geometry: Any,
     position: Any,
-    sway: Callable[[list[Number], Number], Number],
+    sway: Callable[[Any, Number], Number],
 ) -> Any:
     """Bend the separate parts of a mesh about their roots, the middle of their lowest vertices.
 

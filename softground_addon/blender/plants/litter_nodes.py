@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.plants.bending import Pass
 from ..nodes.node_graph import NodeGraph, Number
-from .table_nodes import Table
+from .table_nodes import Table, slot_of
 from .trampling_layout import LEAN, SENT_BY, SINK
 
 ROLLING = 0.4
@@ -35,11 +35,26 @@ def way(graph: NodeGraph, table: Table, by: Pass, height: Number, frame: Number)
     return graph.vector("MULTIPLY_ADD", graph.attribute(LEAN, "FLOAT_VECTOR"), along.socket, upward)
 
 
-def sent_off(graph: NodeGraph, passes: Any, latest: Number, chance: Number, is_touched: Number) -> Any:
-    """Way of litter by the first sole that trod on it, a part of it and to another side for each piece [cells]; none
-    of what is not touched."""
+def sent_off(
+    graph: NodeGraph,
+    table: Table,
+    passes: Any,
+    geometry: Any,
+    domain: str,
+    place: Any,
+    latest: Number,
+    chance: Number,
+) -> tuple[Any, ...]:
+    """The geometry with the way of each piece by the first sole that trod on it, a part of it and to another side for
+    each [cells]; these ways, where each lies then, and the latest pass that acts there; see `table_nodes.in_cells`.
+    """
     by = graph.at_index(passes.vertices, graph.attribute(SENT_BY, "INT"), latest.socket, "INT")
-    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), (chance * is_touched).socket)
+    sent = graph.scaled(graph.at_index(passes.vertices, passes.sent, by), chance.socket)
     angle = ((chance * 17.0).fraction() - 0.5) * ASIDE
     inputs = {"Vector": sent, "Angle": angle.socket}
-    return graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]
+    sent = graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]
+    geometry, (sent,) = graph.captured(geometry, graph.number(sent), kinds="VECTOR", domain=domain)
+    there = graph.vector("MULTIPLY_ADD", sent.socket, (1.0, 1.0, 0.0), place)
+    acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, there), "INT")
+    geometry, (acting,) = graph.captured(geometry, graph.number(acting), kinds="INT", domain=domain)
+    return geometry, sent.socket, there, acting.socket

@@ -10,6 +10,8 @@ from ..nodes.node_graph import NodeGraph, Number
 from .trampling_layout import META, THROWN_FROM, TILES, WIND
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NOWHERE = 1e9
+"""More vertices than a table has: the last one is empty."""
 
 
 @dataclass(frozen=True)
@@ -100,24 +102,44 @@ def any_of(graph: NodeGraph, geometry: Any, condition: Any, domain: str) -> Any:
     return graph.at_index(geometry, total, 0, "INT", domain)
 
 
-def is_over(graph: NodeGraph, table: Table, place: list[Number]) -> Any:
-    """1 of places in cells that are over the table, else 0."""
-    column, row = place
+def is_over(graph: NodeGraph, table: Table, place: Any) -> Any:
+    """1 of places over the table, else 0."""
+    column, row = graph.parts(place)[:2]
     beyond = (0.0 - column).at_least(column - table.columns).at_least((0.0 - row).at_least(row - table.rows))
     return graph.compare("LESS_THAN", beyond.socket, 1.0)
 
 
-def in_cells(graph: NodeGraph, table: Table, root: Any) -> list[Number]:
-    """Column and row of a root, with fractions."""
-    origin = graph.parts(table.origin)[:2]
-    return [graph.number(graph.dot(root, axis)) + first for axis, first in zip(table.axes, origin, strict=True)]
+def in_cells(graph: NodeGraph, table: Table, root: Any) -> Any:
+    """Column and row of a root, with fractions, and its height along `up`.
+
+    Where scatter and table are turned alike, parts of the vector are scaled, in half the time.
+    """
+    axes = [graph.separated(axis) for axis in (*table.axes, table.up)]
+    turned = sum(
+        (
+            graph.number(graph.math("ABSOLUTE", part))
+            for i, axis in enumerate(axes)
+            for j, part in enumerate(axis)
+            if i != j
+        ),
+        graph.number(0.0),
+    )
+    scales, origin = (
+        graph.combined(*(axes[i][i] for i in range(3))),
+        graph.vector("MULTIPLY", table.origin, (1.0, 1.0, 0.0)),
+    )
+    whole = graph.combined(*(graph.dot(root, axis) for axis in (*table.axes, table.up)))
+    turned_there = graph.vector("ADD", whole, origin)
+    return graph.choose(
+        "VECTOR", turned.above(0.0).socket, graph.vector("MULTIPLY_ADD", root, scales, origin), turned_there
+    )
 
 
-def slot_of(graph: NodeGraph, table: Table, place: list[Number]) -> Number:
-    """Slot of a place in cells."""
-    lasts = table.columns, table.rows
-    column, row = (part.floor().at_most(last).at_least(0.0) for part, last in zip(place, lasts, strict=True))
-    tile_column, tile_row = ((part / table.tile).floor() for part in (column, row))
-    number = tile_row * table.row + tile_column
-    begin = graph.number(graph.at_index(table.vertices, graph.attribute(TILES, "INT"), number.socket, "INT"))
-    return begin + row * table.tile + column
+def slot_of(graph: NodeGraph, table: Table, place: Any) -> Any:
+    """Slot of a place in cells; the cells at the edge of the table are empty, and so are those beyond."""
+    most = graph.combined(table.columns.socket, table.rows.socket)
+    cell = graph.vector("FLOOR", graph.vector("MAXIMUM", graph.vector("MINIMUM", place, most), (0.0, 0.0, 0.0)))
+    tile = graph.vector("FLOOR", graph.scaled(cell, graph.math("DIVIDE", 1.0, table.tile.socket)))
+    number = graph.dot(tile, graph.combined(1.0, table.row.socket))
+    begin = graph.at_index(table.vertices, graph.attribute(TILES), number, "FLOAT")
+    return graph.math("ADD", begin, graph.dot(cell, graph.combined(1.0, table.tile.socket)))

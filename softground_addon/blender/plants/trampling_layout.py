@@ -1,11 +1,11 @@
 """Layout of the table by which plants give way: names of its attributes, and its version."""
 
-MARK, VERSION = "softground_give_way", 4
+MARK, VERSION = "softground_give_way", 5
 """Custom property of the group and of the table's vertices: the version of how they fit together."""
 
 TILES, FIRST, SENT_BY = "softground_tiles", "softground_first", "softground_sent_by"
 """Of each tile: its first slot, less what the cell at its corner counts for; of each slot, its first pass; of each
-pass, the first over its cell that trod on it, which sends off what lies there."""
+pass, numbered from 1, the first over its cell that trod on it, which sends off what lies there."""
 ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
     f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
 )

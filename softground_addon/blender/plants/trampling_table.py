@@ -102,7 +102,8 @@ def _play_anew(modifier: Any) -> None:
 
 
 def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> None:
-    """Store the table in the attributes of vertices, each from the first on; lengths in cells."""
+    """Store the table in the attributes of vertices, lengths in cells: each from the first on, passes from the second,
+    as the number of none is 0."""
     stretch, scale, by = units.time_stretch, units.unit_scale_m, trampled.by
     rows, columns = trampled.tiles.shape
     size, side = trampled.cell_size, trampled.tile
@@ -121,9 +122,9 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
     second = is_second[:-2]
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
         (layout.META, "FLOAT_VECTOR", np.array(meta)),
-        (layout.TILES, "INT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
-        (layout.FIRST, "INT", trampled.first),
-        (layout.SENT_BY, "INT", _first_to_tread(trampled)),
+        (layout.TILES, "FLOAT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
+        (layout.FIRST, "INT", trampled.first + 1),
+        (layout.SENT_BY, "INT", _first_to_tread(trampled) + 1),
         (layout.LEAN, "FLOAT2", trampled.direction),
         *(
             (name, "FLOAT_VECTOR", np.column_stack(parts))
@@ -137,11 +138,12 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
         ),
     )
     vertices[layout.MARK] = layout.VERSION
-    count = max(len(values) for _, _, values in arrays) + 1
+    count = max(len(values) for _, _, values in arrays) + 2
     vertices.vertices.add(count)
     for name, kind, values in arrays:
         whole = np.full((count, *values.shape[1:]), NEVER if name == layout.ACTIVE else 0, values.dtype)
-        whole[: len(values)] = values
+        begin = int(name not in (layout.META, layout.TILES, layout.FIRST))
+        whole[begin : begin + len(values)] = values
         mesh_arrays.add_attributes(vertices, [(name, kind, whole)])
 
 

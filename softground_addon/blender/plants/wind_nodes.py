@@ -51,9 +51,9 @@ def _group() -> Any:
     return graph.tree
 
 
-def lean(table: Table, plant: Plant, frame: Number, place: list[Number], chance: Number) -> Number:
+def lean(table: Table, plant: Plant, frame: Number, place: Any, chance: Number) -> Number:
     """Lean of standing plants along the first axis of the table, in right angles."""
-    ahead = place[0] * table.cell
+    ahead = frame.graph.parts(place)[0] * table.cell
     return cast("Number", swayed(table.wind, plant.height, table.metre, frame / table.frame_rate, ahead, chance))
 
 

@@ -71,11 +71,10 @@ OF_WEATHER = {
 """Types of these attributes of a mesh, by their names."""
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
-BLOWN = "softground_blown"
+BLOWN, RAISED = "softground_blown", "softground_raised"
 """What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
 standing water [m]; how dry it looks where it was wet to begin with, and how much of a print blown sand or snow covers,
-0 to 1."""
-
+0 to 1; and for what stands on the ground, how much higher that is under new snow [m]."""
 
 Part = tuple[Matter, tuple[float, float]]
 """What a region is, and least and largest share of its soaking that its hollows have left; see
@@ -273,7 +272,7 @@ class _Vertices:
             remaining = filled + 1.0
             worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * remaining, risen * remaining, rounded), strict=True))
             worn[BLOWN] = (pressed * filled * (-1.0 / COVERED)).within_one()
-        height = change + cover.where(acts["Snowfall"])
+        height = raised = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
             remaining = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
@@ -282,7 +281,8 @@ class _Vertices:
         floods = acts["Rain"] + acts["Water Table"]
         standing = [self._standing(table, relief + height).where(floods)] if matter.soaking else []
         # Once and together, as each node works out all that it asks for anew.
-        geometry, (height, fresh, *others) = graph.captured(geometry, height, fresh, *standing, *worn.values())
+        values = height, fresh, raised, *standing, *worn.values()
+        geometry, (height, fresh, raised, *others) = graph.captured(geometry, *values)
         standing, looks = others[: len(standing)], others[len(standing) :]
         if worn:
             # What takes the place of another is copied.
@@ -290,7 +290,7 @@ class _Vertices:
             for name, look in zip(worn, looks, strict=True):
                 blown = graph.store(blown, name, look.socket, self._mine)
             geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, blown)
-        geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
+        geometry = self._with(geometry, {FRESH: fresh, RAISED: raised}, acts["Snowfall"])
         wetness = self._course.around["wet"]
         if matter.wet:
             wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)

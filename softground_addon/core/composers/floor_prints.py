@@ -33,8 +33,11 @@ class _Floor:
 
     def heights(self, x: Array, y: Array) -> Array:
         """Heights at world positions [m], NaN where soft ground lies over it, or it is a deck above."""
-        hard, soft = self.terrain.hard_heights(x, y), self.terrain.ground.heights(x, y)
-        return np.where((soft > hard + SAME_LAYER) | (hard > soft + HIGHEST), np.nan, hard)
+        hard = self.terrain.hard_heights(x, y)
+        floor = ~np.isnan(hard)
+        soft = self.terrain.ground.heights(x[floor], y[floor])
+        hard[floor] = np.where((soft > hard[floor] + SAME_LAYER) | (hard[floor] > soft + HIGHEST), np.nan, hard[floor])
+        return hard
 
 
 @sliced

@@ -60,7 +60,7 @@ class SoleLayout(ContactLayout):
         poses = self.steps.poses[steps]
         posed = self._remembered if self.remembers else self._posed
         over_ground, patches = posed(start, end, window, cells.undisturbed)
-        divisions, surface = points.cell_divisions(cells.cell_size), cells.surface(window)
+        divisions = points.cell_divisions(cells.cell_size)
         upright = self.steps.normals[steps, 2, None]
         area = (over_ground.area + over_ground.beyond) / upright
         factors = cells.factors(window)
@@ -96,7 +96,7 @@ class SoleLayout(ContactLayout):
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
         rim = np.zeros(coverage.shape)
         if material.poisson_ratio:
-            rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
+            rim = rim_weights(coverage, contact, cells.rim_reach, cells.surface(window).bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed, plate)
         stress = self._stress(steps, window, cells, sinking, area * fraction, plate)
         if factors and stress.ndim == 1:

@@ -29,7 +29,7 @@ from tests.tiers import slow_but_one
 FRAMES = (1, 20, 34, 300)
 SOME = weathered_shots.SOME | {"Water Table": 2.0, "Halo": 0.8}
 DEFAULTS = {name: value for name, value, *_ in weather_inputs.INPUTS}
-MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED, nodes.BLOWN)
+MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED, nodes.BLOWN, nodes.RAISED)
 """What is not stored where the ground does not ask for it, and where there is no weather."""
 HOUR = 3600.0
 
@@ -443,7 +443,7 @@ def test_the_final_mesh_stands_under_the_weather_of_the_last_frame(opened):
     # The playback adds a height to the place at rest, the mesh holds where that led: they differ by a rounding.
     assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
     assert scene.frame_current == 5
-    assert set(still.attributes.keys()) == {*without.attributes.keys(), nodes.WETNESS, nodes.FRESH}
+    assert set(still.attributes.keys()) == {*without.attributes.keys(), nodes.WETNESS, nodes.FRESH, nodes.RAISED}
     weather_modifier.modifier_of(carrier(scene)).show_viewport = False
     plain = exports.final_mesh(scene.softground.ground).data
     assert contents(plain) == contents(without)
@@ -486,7 +486,7 @@ def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
     ("values", "stored"),
     [
         ({"Wind": 8.0}, ()),
-        ({"Snowfall": 2.0}, (nodes.FRESH,)),
+        ({"Snowfall": 2.0}, (nodes.FRESH, nodes.RAISED)),
         ({"Drying": 0.4}, (nodes.DRIED,)),
         ({"Halo": 0.5}, (nodes.DRIED,)),
         ({"Rain": 30.0}, (nodes.WATER,)),

@@ -558,6 +558,39 @@ def test_the_ground_itself_does_not_give_way_without_a_scatter(shot):
     assert not bpy.ops.softground.give_way.poll()
 
 
+def test_many_objects_give_way_with_as_few_evaluations_as_one(shot):
+    pieces, evaluations = [loose(roots(2)) for _ in range(8)], []
+
+    def note(*_):
+        evaluations.append(len(pieces))
+
+    def count(*objects):
+        bpy.context.view_layer.update()
+        evaluations.clear()
+        give_way(*objects)
+        return len(evaluations)
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        of_one, of_many = count(pieces[0]), count(*pieces[1:])
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+    assert of_many <= of_one + 1
+    assert all(len(piece.modifiers) == 1 for piece in pieces)
+
+
+def test_particles_are_refused_until_they_are_made_real(shot):
+    blade, emitter = scattered(np.zeros((1, 3))), loose(roots(4))
+    blade = linked("Blade", blade.modifiers[0].node_group.nodes[-1].inputs["Object"].default_value.data)
+    bpy.context.view_layer.objects.active = emitter
+    bpy.ops.object.particle_system_add()
+    strewn = emitter.particle_systems[0].settings
+    strewn.type, strewn.count, strewn.render_type, strewn.instance_object = "HAIR", 50, "OBJECT", blade
+    with pytest.raises(RuntimeError, match="'Blades' scatters particles, which no modifier moves: make them real"):
+        give_way(emitter)
+    assert [modifier.type for modifier in emitter.modifiers] == ["PARTICLE_SYSTEM"]
+
+
 def test_the_sample_meadow_grows_on_the_ground_and_gives_way(shot):
     assert bpy.ops.softground.add_sample_meadow() == {"FINISHED"}
     grass = bpy.data.objects["SoftGround Meadow"]

@@ -196,3 +196,32 @@ def test_snow_covers_what_is_low_and_lifts_nothing(shot):
     top = np.array([shown.matrix_world @ vertex.co for vertex in shown.data.vertices])[:, 2]
     assert np.median(top) > 0.05
     assert np.median(top) > blades(leaves)[0][:, 2].max()
+
+
+def on_the_ground(scatter):
+    """The scatter on the vertices of the ground that shows the prints, in place of its own."""
+    tree = scatter.modifiers[0].node_group
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value = baked_ground.display_mesh_of(bpy.context.scene.softground.ground)
+    on = next(node for node in tree.nodes if node.bl_idname == "GeometryNodeInstanceOnPoints")
+    tree.links.new(info.outputs["Geometry"], on.inputs["Points"])
+    return scatter
+
+
+@pytest.mark.parametrize("kind", ["MEADOW", "LITTER"])
+def test_snow_lifts_no_scatter_that_follows_the_ground(shot, kind):
+    scatter = on_the_ground(scattered(roots()))
+    modifier = give_way(scatter, kind=kind)
+    assert compat.read_input(modifier, inputs_of(modifier)["Sinks"]) is False
+    before = {}
+    for frame in (-20, 48):
+        shot.frame_set(frame)
+        before[frame] = blades(scatter)
+    blow(0.0, Snowfall=100.0, **{"Time Scale": 7200.0})
+    for frame in (-20, 48):
+        shot.frame_set(frame)
+        for was, now in zip(before[frame], blades(scatter), strict=True):
+            np.testing.assert_allclose(now, was, atol=1e-5)
+    modifier.show_viewport = False
+    bpy.context.view_layer.update()
+    assert np.median(blades(scatter)[0][:, 2] - before[48][0][:, 2]) > 0.05
