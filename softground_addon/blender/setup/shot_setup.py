@@ -14,8 +14,10 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ...batch import manifest
 from ...batch.shell import command_line
+from ...core.composers.ground_plan import GroundPlan, plan_ground
 from ...core.errors import InputError
 from ...core.ground import surfaces
+from ...core.settings import BakeSettings
 from .. import further_grounds, ground_presets, ground_slots, jobs, settings
 from ..baking import scene_findings
 from ..characters import character_setup, prop_setup, recognition, selection
@@ -172,7 +174,7 @@ class SOFTGROUND_OT_create_ground(Reading):
                 return (yield from _taken_as_ground(scene, chosen))
         options, has_first = scene.softground, settings.exists(scene.softground.ground)
         wanted = shots.settings_of(scene)
-        plan = yield from shots.fit_ground(scene, wanted)
+        plan = yield from _planned(scene, wanted)
         with ExitStack() as drafts:
             now = jobs.Progress("sample", 1.0)
             layout = yield from jobs.meanwhile(now, created_ground.laid_out.slices(wanted, plan))
@@ -191,6 +193,16 @@ class SOFTGROUND_OT_create_ground(Reading):
         count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
         text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
         return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
+
+
+def _planned(scene: bpy.types.Scene, wanted: BakeSettings) -> jobs.Job[GroundPlan]:
+    """The ground that fits the walk; if bodies may carve it, by how deep the shot is predicted to be."""
+    if wanted.carves:
+        with suppress(InputError):  # of a shot that cannot be baked on the ground that it has
+            motions = (yield from analysis.reading(scene)).shot.motions
+            depth = (yield from analysis.working_out_depth(scene)) or 0.0
+            return (yield from jobs.meanwhile(jobs.Progress("sample", 1.0), plan_ground.slices(motions, depth)))
+    return (yield from shots.fit_ground(scene, wanted))
 
 
 def _is_as_made(ground: bpy.types.Object, scene: bpy.types.Scene) -> bool:

@@ -1,6 +1,11 @@
-"""A ground that the add-on made gives way to the next one, unless somebody has changed it or uses it."""
+"""A ground that the add-on made gives way to the next one, unless somebody has changed it or uses it; where legs plough
+it is as fine as under feet."""
 
 import bpy
+import pytest
+
+from softground_addon.blender.ground import trail_detail
+from tests.blender.response import test_carving
 
 
 def recreated(scene):
@@ -91,3 +96,14 @@ def test_a_made_ground_with_a_bake_on_it_and_a_mesh_of_the_users_stay(short_walk
     short_walk.softground.ground = bpy.context.object
     assert len(recreated(short_walk)) == 3
     assert "Grid" in short_walk.objects
+
+
+@pytest.mark.parametrize("made_by", ["bake", "create_ground"])
+def test_a_made_ground_is_fine_where_legs_plough(scene, made_by):
+    test_carving.walker(scene, **test_carving.SHIN_DEEP)
+    scene.softground.cell_size = 0.005
+    getattr(bpy.ops.softground, made_by)()
+    report, _ = test_carving.bake(scene)
+    assert report["totals"]["carved_m3"] > 0
+    assert not {"coarse_ground", "finer_copy"} & {found["code"] for found in report["self_check"]}
+    assert trail_detail.detail_of(scene.softground.ground) is None
