@@ -279,8 +279,7 @@ def write_prints(
         _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
         findings: list[Finding] = []
         if shot.surface is None:
-            assert shot.layout is not None
-            place = yield from _created(drafts, scene, wanted, shot.layout, trail)
+            place = yield from _created(drafts, scene, wanted, shot, trail)
             record.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, footprints, trail, sole_length)
@@ -293,11 +292,18 @@ def write_prints(
 
 
 def _created(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, layout: created_ground.Layout, trail: Trail
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, trail: Trail
 ) -> Job[baked_ground.Place]:
-    """A draft of a ground that fits the walk, as the place for a bake."""
-    name = yield from meanwhile(Progress("write", 0.1), created_ground.created(drafts, wanted, layout))
-    yield Progress("write", 0.1)
+    """A draft of a ground that fits the walk, as the place for a bake; fine as well where legs ploughed."""
+    now, cell_size, layout, plan = Progress("write", 0.1), wanted.cell_size_m, shot.layout, shot.plan
+    assert layout is not None
+    assert plan is not None
+    cover = yield from meanwhile(now, coverage.slices(layout.vertices, slice(None), trail.printed, cell_size))
+    if cover.is_coarse(cell_size):
+        plan = plan.with_prints(trail.printed, cell_size)
+        layout = yield from meanwhile(now, created_ground.laid_out.slices(wanted, plan))
+    name = yield from meanwhile(now, created_ground.created(drafts, wanted, layout))
+    yield now
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
 

@@ -198,11 +198,11 @@ def _turns(mode: str, poses: Array, euler: Array) -> tuple[str, Array, float]:
 
 
 def _frames(scene: bpy.types.Scene, armature: bpy.types.Object) -> range:
-    """All frames at which the character may be played."""
+    """The frames of the bake, and those beyond in which the character's own curves move it, at most to the end of the
+    scene; not those in which only its parents go on."""
     options, stretch = scene.softground, settings.time_stretch_of(scene)
-    animated = [frame / stretch for frame in animated_frames(scene, armature) or ()]
-    first = min(scene.frame_start, options.frame_start, *animated)
-    last = max(scene.frame_end, options.frame_end, *animated)
+    animated = [frame / stretch for frame in animated_frames(scene, armature, alone=True) or ()]
+    first, last = min([options.frame_start, *animated]), max([options.frame_end, *animated])
     return range(floor(first), ceil(last) + 1)
 
 

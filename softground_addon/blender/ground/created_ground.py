@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from zlib import crc32
 
 import bpy
 import numpy as np
@@ -20,7 +21,7 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.settings import BakeSettings, ObjectName
 from ..drafts import none_left_if_it_fails
 from ..materials.materials import EDGE, drafted, ensure_material
-from ..mesh_arrays import add_attributes, add_faces
+from ..mesh_arrays import add_attributes, add_faces, positions
 from ..placement import to_world
 from ..settings import find, name_of, resolve
 from .ground_mesh import discard, mesh_of, write_positions
@@ -31,6 +32,9 @@ MAX_GRID_VERTICES = 4_000_000
 COARSEST = 0.4
 """Side of the largest faces, far from the trail [m]: what follows vertices, such as paint, still has some. Larger only
 where so many would exceed `MAX_GRID_VERTICES`, as between characters that are kilometres apart."""
+
+AS_CREATED = "softground_as_created"
+"""Property of a mesh that was made: the `made_shape` of its ground then."""
 
 SOFT_EDGE = 0.5
 """Part of its margin over which a ground ends softly."""
@@ -188,7 +192,20 @@ def draft(drafts: ExitStack, layout: Layout, edge: float = 0.0) -> Slices[Object
     if edge > 0:
         inward = np.minimum(*(np.minimum(axis - axis.min(), axis.max() - axis) for axis in layout.vertices.T[:2]))
         add_attributes(mesh_of(resolve(name)), [(EDGE, "FLOAT", np.clip(1.0 - inward / edge, 0.0, 1.0))])
+    yield
+    mesh_of(resolve(name))[AS_CREATED] = made_shape(resolve(name))
     return name
+
+
+def made_shape(ground: bpy.types.Object) -> str:
+    """Checksum of what a user may edit of a ground that was made: its place, vertices, UV maps and attributes."""
+    mesh = mesh_of(ground)
+    values = [positions(mesh), *(np.empty(2 * len(layer.uv), np.float32) for layer in mesh.uv_layers)]
+    for layer, uv in zip(mesh.uv_layers, values[1:], strict=True):
+        layer.uv.foreach_get("vector", uv)
+    names = sorted(item.name for item in mesh.attributes if not item.name.startswith("."))
+    said = repr(([tuple(row) for row in ground.matrix_basis], names, [crc32(each.tobytes()) for each in values]))
+    return f"{crc32(said.encode()):08x}"
 
 
 def _discard_unpublished(name: ObjectName) -> None:

@@ -94,11 +94,18 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
 
     own_up = ride().rest
     level = upright(own_up.mean(axis=0))
-    leaning = np.degrees(np.arccos(np.clip(unit(own_up) @ level[2], -1.0, 1.0)).max())
-    if leaning > STEEPEST:
+    if (leaning := _lean(own_up)).max() > STEEPEST:
+        tilt, most = leaning.max(), f"and at most {STEEPEST:.0f}° can be baked at once"
+        if _lean(up @ axes).max() > STEEPEST:
+            raise InputError(
+                f"Ground '{name}' tilts by up to {tilt:.0f}° against what pulls on it, at frame "
+                f"{frames[leaning.argmax()]}, {most}: bake fewer frames, or choose a ground that turns less."
+            )
+        changes = np.linalg.norm(np.einsum("fij,fj->fi", axes, own_up) - up, axis=1) * wanted.gravity_m_s2
         raise InputError(
-            f"Ground '{name}' tilts by up to {leaning:.0f}° against what pulls on it in these frames, and at most "
-            f"{STEEPEST:.0f}° can be baked at once: bake fewer frames, or choose a ground that turns less."
+            f"Ground '{name}' changes its speed by {changes.max():.0f} m/s² around frame {frames[changes.argmax()]}, "
+            f"which tilts what pulls on those who stand there by up to {tilt:.0f}°, {most}: key it before Start and "
+            "after End, or make its curves linear (Graph Editor > Key > Interpolation Mode)."
         )
     to_world[:, :3, :3] = to_world[:, :3, :3] @ level.T
     in_units = to_world.copy()
@@ -107,6 +114,11 @@ def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFr
     place = path[0] @ matrices[0]
     frame = GroundFrame(rows(place), True, float(frames[0]), path, ride())
     return replace(frame, riding=_riding(scene.objects, ground, place))
+
+
+def _lean(up: Array) -> Array:
+    """Angle of each direction (F, 3) from their mean, (F,) [degrees]."""
+    return np.degrees(np.arccos(np.clip(unit(up) @ upright(up.mean(axis=0))[2], -1.0, 1.0)))
 
 
 def _paths(

@@ -18,19 +18,20 @@ LEVEL = 1e-6
 """A curve that goes straight on by less than this in a frame stays where it is: rounding."""
 
 
-def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, int] | None:
+def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object, *, alone: bool = False) -> tuple[int, int] | None:
     """First and last frame of the animation of an object, as `animated_range` has it."""
-    animated = animated_range(scene, obj)
+    animated = animated_range(scene, obj, alone=alone)
     return animated and (floor(animated[0]), ceil(animated[1]))
 
 
-def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | None:
-    """Times of the first key and the last of an object, and of those that it is parented to, in frames.
+def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object, *, alone: bool = False) -> Range | None:
+    """Times of the first key and the last of an object, and unless alone of those that it is parented to, in frames.
 
     Without any, of the leaders of its constraints. Curves that go on, by a modifier or by extrapolation, last as
     long as the scene.
     """
-    ranges = list(_ranges(obj, frozenset()))
+    ranges = list(_of_data(obj.animation_data)) if alone and obj.animation_data else []
+    ranges = ranges or list(_ranges(obj, frozenset()))
     if not ranges:
         return None
     starts, ends = zip(*ranges, strict=True)

@@ -14,9 +14,11 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ...batch import manifest
 from ...batch.shell import command_line
+from ...core.composers.ground_plan import GroundPlan, plan_ground
 from ...core.errors import InputError
 from ...core.ground import surfaces
-from .. import further_grounds, ground_presets, jobs, settings
+from ...core.settings import BakeSettings
+from .. import further_grounds, ground_presets, ground_slots, jobs, settings
 from ..baking import scene_findings
 from ..characters import character_setup, prop_setup, recognition, selection
 from ..command_line import program
@@ -172,7 +174,7 @@ class SOFTGROUND_OT_create_ground(Reading):
                 return (yield from _taken_as_ground(scene, chosen))
         options, has_first = scene.softground, settings.exists(scene.softground.ground)
         wanted = shots.settings_of(scene)
-        plan = yield from shots.fit_ground(scene, wanted)
+        plan = yield from _planned(scene, wanted)
         with ExitStack() as drafts:
             now = jobs.Progress("sample", 1.0)
             layout = yield from jobs.meanwhile(now, created_ground.laid_out.slices(wanted, plan))
@@ -180,14 +182,55 @@ class SOFTGROUND_OT_create_ground(Reading):
             ground = settings.resolve(name)
             with analysis.own_changes(scene):
                 before = options.ground
+                former = before if has_first and _is_as_made(before, scene) else None
                 created_ground.publish(scene, ground, wanted.surface)
-                if before and not has_first:  # it was the next in the list
+                if former:
+                    _take_place(ground, former)
+                elif before and not has_first:  # it was the next in the list
                     options.ground = before
                     further_grounds.choose(options, further_grounds.add(options, ground))
         created_ground.select(scene, ground)
         count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
         text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
         return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
+
+
+def _planned(scene: bpy.types.Scene, wanted: BakeSettings) -> jobs.Job[GroundPlan]:
+    """The ground that fits the walk; if bodies may carve it, by how deep the shot is predicted to be."""
+    if wanted.carves:
+        with suppress(InputError):  # of a shot that cannot be baked on the ground that it has
+            motions = (yield from analysis.reading(scene)).shot.motions
+            depth = (yield from analysis.working_out_depth(scene)) or 0.0
+            return (yield from jobs.meanwhile(jobs.Progress("sample", 1.0), plan_ground.slices(motions, depth)))
+    return (yield from shots.fit_ground(scene, wanted))
+
+
+def _is_as_made(ground: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """True if the add-on made this ground, and nobody has changed it, baked on it or made anything else use it."""
+    if ground.type != "MESH" or ground.library or baked_ground.has_remains(ground):
+        return False
+    mesh, users = ground_mesh.mesh_of(ground), bpy.data.user_map(subset={ground})[ground]
+    added: Any = (ground.parent, ground.animation_data, mesh.animation_data, mesh.shape_keys, ground.rigid_body)
+    added += (*ground.modifiers, *ground.constraints, *ground.vertex_groups, *ground.keys())
+    return (
+        not any(each is not None for each in added)
+        and ground.users_scene == (scene,)
+        and all(isinstance(user, bpy.types.Scene | bpy.types.Collection) for user in users)
+        and [each and each.get(ground_slots.MARK) in surfaces.SURFACES for each in mesh.materials] == [True]
+        and mesh.users - mesh.use_fake_user == 1
+        and mesh.get(created_ground.AS_CREATED) == created_ground.made_shape(ground)
+    )
+
+
+def _take_place(ground: bpy.types.Object, former: bpy.types.Object) -> None:
+    """Put a ground where another one was, with its name, and remove that."""
+    name, collections = former.name, former.users_collection
+    for collection in set(ground.users_collection) - set(collections):
+        collection.objects.unlink(ground)
+    for collection in set(collections) - set(ground.users_collection):
+        collection.objects.link(ground)
+    ground_mesh.discard(former)
+    ground.name = name
 
 
 def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.camera_view import FARTHEST, CameraView
 from ..ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
@@ -18,6 +17,7 @@ from ..motion.sole_motion import SoleMotion, shortest_length
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.cell_keys import Keys, cells_at, cells_of, keys_of
 from ..numerics.slices import Slices, sliced
+from ..soles.deep_ground import wading
 
 MARGIN = 2.0
 """How far the ground reaches beyond the feet, in lengths of the longest sole."""
@@ -30,6 +30,9 @@ POINTS_ALONG_SOLE = 24
 
 NEAR_GROUND = 0.15
 """Parts of a sole that are higher than this above the ground do not press it at the time, in lengths of the sole."""
+
+DEEPER = 1.5
+"""Depth of deep prints, over that of the typical one."""
 
 STEEPER_KEEPS = 0.25
 """Share of the moments of standing that an inclined ground has to keep beyond what a level one keeps: less is noise
@@ -105,6 +108,11 @@ class GroundPlan:
         disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
         return cells_of(np.unique(cells_at(footfalls, side)[:, None] + disc)), level
 
+    def with_prints(self, printed: Keys, cell_size: float) -> GroundPlan:
+        """The plan with printed cells of a size [m] among its footfalls, as legs plough more than lies under soles."""
+        keys = np.unique(cells_at((cells_of(printed) + 0.5) * cell_size, self.raster))
+        return replace(self, footfalls=np.concatenate([self.footfalls, (cells_of(keys) + 0.5) * self.raster]))
+
     def widened(self, margin: float, camera: CameraView | None) -> GroundPlan:
         """The plan with a margin [m] on all sides, and over what a camera sees of it; without a margin as it is."""
         if not margin > 0:
@@ -128,10 +136,11 @@ def extent(motions: Sequence[CharacterMotion]) -> tuple[Array, Array]:
 
 
 @sliced
-def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
+def plan_ground(motions: Sequence[CharacterMotion], depth: float = 0.0) -> Slices[GroundPlan]:
     """The plane under the lowest positions of the soles, with a margin around all of their paths.
 
-    It is level, unless the soles stand on a slope.
+    It is level, unless the soles stand on a slope. Where the typical print has a depth [m] in which legs plough, what
+    they pass on their way is among its footfalls.
     """
     slope = _slope([motion for motion in motions if motion.centre is None])
     levels = [] if slope.any() else [motion.ground_level for motion in motions if motion.ground_level is not None]
@@ -157,7 +166,9 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
             if sole.sole.prop:
                 footfalls.append(_places_under_prop(sole, _terrain(height, slope), raster))
             else:
-                footfalls.append(_places_under(sole, touching, _terrain(low + offset, slope), raster))
+                deep = DEEPER * depth if wading(DEEPER * depth, sole.sole.length) > 0 else 0.0
+                near, under = max(NEAR_GROUND * sole.sole.length, deep), _terrain(low + offset, slope)
+                footfalls.append(_places_under(sole, touching | (deep > 0), under, raster, near))
     yield
     missed = [(motion.name, missed_steps(motion, contact)) for motion, contact in zip(motions, contacts, strict=True)]
     return GroundPlan(
@@ -226,8 +237,9 @@ def _footholds(motion: CharacterMotion) -> Array:
     return np.concatenate(footholds)
 
 
-def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrain, raster: float) -> Array:
-    """Places under a sole while it touches, (N, 2) [m], one in each square of a raster.
+def _places_under(sole: SoleMotion, touching: Mask, terrain: Terrain, raster: float, near: float) -> Array:
+    """Places under a sole while it touches, as far as it is near its ground [m], (N, 2) [m], one in each square of a
+    raster.
 
     Contacts begin and end between frames: it counts as touching until halfway to the next.
     """
@@ -243,8 +255,8 @@ def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrai
             pose = poses[first : first + _FRAMES_AT_ONCE, number, :3]
             places = points @ pose[..., :3].transpose(0, 2, 1) + pose[:, None, :, 3]
             x, y, z = np.moveaxis(places, -1, 0)
-            near = z - terrain.heights(x, y) < NEAR_GROUND * sole.sole.length
-            keys = np.union1d(keys, cells_at(places[near, :2], raster))
+            low = z - terrain.heights(x, y) < near
+            keys = np.union1d(keys, cells_at(places[low, :2], raster))
     return (cells_of(keys) + 0.5) * raster
 
 

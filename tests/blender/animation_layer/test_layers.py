@@ -335,6 +335,35 @@ def test_made_keys_show_what_the_layers_showed_and_keep_the_users_action(scene, 
     assert "response_in_keys" in {finding["code"] for finding in result.report["self_check"]}
 
 
+@pytest.mark.parametrize("goes_on", ["not", "parent", "cycles", "further keys"])
+def test_made_keys_last_as_long_as_the_walk_and_the_bake(scene, walker, goes_on):
+    """A clip with a tail that stands still is no walk; what is seen after the bake stays."""
+    scene.frame_end, last = 250, {"cycles": 250, "further keys": 60}.get(goes_on, 48)
+    if goes_on == "parent":  # as Walk Ahead makes one
+        walker.parent = bpy.data.objects.new("Travel", None)
+        scene.collection.objects.link(walker.parent)
+        for frame in (1, 48):
+            walker.parent.location.x = frame / 1000
+            walker.parent.keyframe_insert("location", frame=frame)
+    of_walk = action_curves(walker.animation_data.action)
+    of_parent = action_curves(walker.parent.animation_data.action) if walker.parent else []
+    for curve in of_parent:
+        curve.extrapolation = "LINEAR"
+    if goes_on == "cycles":
+        for curve in of_walk:
+            curve.modifiers.new("CYCLES")
+        walker.animation_data.action.update_tag()
+    if goes_on == "further keys":
+        walker.pose.bones["hips"].location.z += 0.01
+        walker.pose.bones["hips"].keyframe_insert("location", frame=last)
+    bpy.ops.softground.bake()
+    watched = (1, 20, 48, last)
+    poses = shown(scene, walker, watched)
+    bpy.ops.softground.make_keys()
+    assert tuple(walker.animation_data.action.frame_range) == (1, last)
+    assert shown(scene, walker, watched) == pytest.approx(poses, abs=1.5e-3)
+
+
 def test_made_keys_of_ik_controls_and_of_the_object_that_travels(scene):
     responders.with_ik()
     armature = bpy.context.view_layer.objects.active

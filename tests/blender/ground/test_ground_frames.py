@@ -1,5 +1,6 @@
 """Ground far from the origin, and turned ground under turned gravity, are baked as level ground at the origin is."""
 
+import re
 from math import pi
 
 import bpy
@@ -375,7 +376,9 @@ def turning_over(time):
 def test_a_ground_that_turns_over_or_changes_its_size_is_refused(short_walk):
     ship = deck(short_walk, keyed=turning_over)
     short_walk.softground.frame_end = 60
-    with pytest.raises(InputError, match=r"Ground 'Field' tilts by up to \d+° against what pulls on it"):
+    with pytest.raises(
+        InputError, match=r"Ground 'Field' tilts by up to \d+° against what pulls on it, at frame (1|60)\b"
+    ):
         bake(short_walk)
     ship.animation_data_clear()
     for frame, size in ((1, 1.0), (30, 1.2)):
@@ -383,6 +386,29 @@ def test_a_ground_that_turns_over_or_changes_its_size_is_refused(short_walk):
         ship.keyframe_insert("scale", frame=frame)
     with pytest.raises(InputError, match="Ground 'Field' changes its size in these frames"):
         bake(short_walk)
+
+
+@pytest.mark.parametrize(("slow", "first", "last"), [(2, 1, 60), (27, -20, 28)])
+def test_a_deck_that_sets_off_or_stops_at_once_is_named_with_the_frame_and_the_way_out(short_walk, slow, first, last):
+    """As between the first two keys or the last two of curves that ease, though the deck hardly tilts."""
+    ship = deck(short_walk)
+    for frame in range(first, last + 1, 3):
+        (ship.location, _), tilt = sailing(frame / 24), 0.14 * np.sin(frame / 12)
+        ship.rotation_euler.x = tilt
+        ship.keyframe_insert("location", frame=frame)
+        ship.keyframe_insert("rotation_euler", frame=frame)
+    short_walk.softground.frame_end = min(last, 30)
+    with pytest.raises(InputError) as refused:
+        bake(short_walk)
+    said = re.search(r"'Field' changes its speed by (\d+) m/s² around frame (\d+), which tilts", str(refused.value))
+    assert said
+    assert 15 < float(said[1]) < 60
+    assert abs(int(said[2]) - slow) <= 4
+    assert "before Start and after End, or make its curves linear" in str(refused.value)
+    for curve in action_curves(ship.animation_data.action):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    bake(short_walk)
 
 
 def test_feet_sink_into_prints_on_a_sailing_deck_as_on_a_still_one(short_walk):
