@@ -157,6 +157,22 @@ def test_a_step_whose_skin_has_sunk_into_the_ground_is_that_skins(depth, agrees)
     assert ("step_without_skin" not in findings) == agrees
 
 
+@pytest.mark.parametrize("at_end", [True, False])
+@pytest.mark.parametrize(("lasts", "rests", "agrees"), [(2, 0, True), (8, 3, True), (8, 0, False)])
+def test_a_step_that_an_end_of_the_shot_cuts_wants_skin_at_some_time_and_none_where_it_is_a_moment(
+    lasts, rests, agrees, at_end
+):
+    """What lands in the last frames, or leaves in the first, shows nothing of its middle."""
+    loads = stands()
+    frames, skin = loads.motion.frames, loads.motion.skin
+    from_end = frames[-1] - frames if at_end else frames - frames[0]
+    touching = loads.contacts.touching.copy()
+    touching[:, 1] = from_end <= lasts
+    skin.rise[:, 1] = np.where(from_end[loads.motion.on_frames] <= rests - 1, 0.0, 1.0)
+    cut = replace(loads, contacts=replace(loads.contacts, touching=touching))
+    assert ("step_without_skin" not in findings_of(cut)) == agrees
+
+
 def test_a_foot_that_bears_on_the_edge_of_its_sole_leaves_no_print_and_says_so():
     loads = stands()
     loads.motion.soles[0].transforms[:] = pose(PLACES[0], 0.0, np.pi / 2)
