@@ -14,7 +14,7 @@ from ..imprints.sole_points import places, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.hovering import hovering
 from ..loads.missed_steps import advice, missed_steps
-from ..loads.sliding import treadmill_speed
+from ..loads.sliding import treadmill_speed, uneven_slides
 from ..motion.motion import CharacterMotion
 from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
@@ -140,6 +140,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "Use the animation with its root motion.",
             {"character": motion.name, "speed": round(belt, 3)},
         )
+    if uneven := uneven_slides(motion, character.contacts):
+        yield uneven
 
 
 def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
