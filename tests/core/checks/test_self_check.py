@@ -116,7 +116,10 @@ def test_each_contact_is_judged_by_its_own_skin_and_named():
     touching = loads.contacts.touching.copy()
     touching[:, 1] = False
     missing = replace(loads, contacts=replace(loads.contacts, touching=touching))
-    assert "'right', 'tail' of" in findings_of(missing)["skin_without_step"].message
+    said = findings_of(missing)
+    assert "'tail' of" in said["skin_without_step"].message
+    assert "The contact 'right' of 'walker'" in said["contact_without_step"].message
+    assert "add" not in said["contact_without_step"].text.lower()  # it is in the list already
     aloft = np.add(apart[:2], [[0, 0, 0.1], [0, 0, 0]])
     over = named(stands(aloft, apart[:2]), ("foot.L", "foot.R"), ("left", "right"))
     assert "'left' of" in findings_of(over)["step_without_skin"].message
