@@ -173,11 +173,12 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
     if not likely:
         likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "the length of its legs"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
+        size = f"is {motion.size:.2g} m in size and " if motion.size > 0 else ""
         yield Finding(
             "mass_of_size",
             "warning",
-            f"'{motion.name}' weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
-            "Give it its mass.",
+            f"'{motion.name}' {size}weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
+            "Give it its mass, or scale it if that is not its size.",
             {"character": motion.name, "mass": motion.mass, "likely": float(f"{likely:.2g}")},
         )
 
