@@ -14,7 +14,7 @@ REMEDIES = {
     "sole_without_print": "check that its sole faces down, and that its bone in Contacts is right.",
     "walks_in_place": "Press Walk Ahead, or use the animation with its root motion.",
     "unit_scale": "Press Scale by {factor:g}, or leave it if the size is intended.",
-    "mass_of_size": "Set Mass.",
+    "mass_of_size": "Set Mass, or scale the rig if that is not its size.",
     "level_on_slope": "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
     "step_without_skin": "check in Properties > Physics > Contacts that its contacts are the parts that touch the "
     "ground.",

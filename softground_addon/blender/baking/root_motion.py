@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.loads.sliding import uneven_slides
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity
@@ -37,11 +38,14 @@ class Travel:
         The bone that is keyed, or the armature object.
     speed : float
         [m/s].
+    caveat : str
+        What it cannot do: let feet rest that slide at different speeds.
     """
 
     character: str
     control: str
     speed: float
+    caveat: str = ""
 
     def as_dict(self) -> dict[str, object]:
         """For JSON."""
@@ -75,17 +79,22 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     shot = yield from read_shot(scene, wanted, LayerKind.ROOT_MOTION)
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
+    caveat = ""
     for moving, motion, of_character in zip(wanted.characters, shot.motions, loads, strict=True):
         if not moving.armature:
             continue
         work = lacking_velocity.slices(motion, of_character, shot.terrain)
         velocity = yield from meanwhile(Progress("simulate", 1.0), work)
+        uneven = uneven_slides(of_character.motion, of_character.contacts)
+        caveat = uneven.text if uneven else ""
         if velocity is None:
             continue
         travel, curves = _layer(scene.view_layers[0], moving, motion, wanted, velocity)
-        layers.append((moving.armature, travel, curves))
+        layers.append((moving.armature, replace(travel, caveat=caveat), curves))
     if not layers:
-        raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
+        raise InputError(
+            caveat or "No character here walks on the spot: its feet rest, or no speed lets all of them rest."
+        )
     for name, travel, curves in layers:
         armature = settings.resolve(name)
         for kind in LayerKind:  # the others were made for a walk on the spot

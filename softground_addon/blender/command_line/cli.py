@@ -194,7 +194,7 @@ def _clean(options: argparse.Namespace) -> None:
             path.write_bytes(report.dump(content).encode())
     for line in (*(travel.summary for travel in travels), cleaned.summary):
         print(line, flush=True)
-    for warning in cleaned.warnings:
+    for warning in (*(travel.caveat for travel in travels if travel.caveat), *cleaned.warnings):
         print(f"softground: {warning}", file=sys.stderr)
 
 

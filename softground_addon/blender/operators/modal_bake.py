@@ -161,6 +161,8 @@ class SOFTGROUND_OT_root_motion(_ChangingTheMotion):
     def _show(self, result: tuple[root_motion.Travel, ...]) -> None:
         for travel in result:
             self.report({"INFO"}, travel.summary)
+            if travel.caveat:
+                self.report({"WARNING"}, travel.caveat)
 
 
 CLASSES = (

@@ -101,7 +101,10 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
                 by_volume = mass == character.skin_mass
+                _, size = import_fixes.sizes_of(settings.scene_of(context).unit_settings.scale_length, character)
                 text = translated("{mass} kg by Volume" if by_volume else "{mass} kg by Height", mass=f"{mass:g}")
+                if by_volume and size > 0:  # one that is larger in its file than in life weighs tons
+                    text = translated("{mass} kg by Volume ({size} m)", mass=f"{mass:g}", size=f"{size:.2g}")
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
 
 

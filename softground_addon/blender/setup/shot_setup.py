@@ -20,7 +20,7 @@ from ...core.ground import surfaces
 from ...core.settings import BakeSettings
 from .. import further_grounds, ground_presets, ground_slots, jobs, settings
 from ..baking import scene_findings
-from ..characters import character_setup, prop_setup, recognition, selection
+from ..characters import character_setup, import_fixes, prop_setup, recognition, selection
 from ..command_line import program
 from ..ground import baked_ground, created_ground, ground_checks, ground_mesh, look, trail_detail
 from ..operator_base import Act, OnGround
@@ -94,6 +94,10 @@ def _add(
         soles = ", ".join(sole.name for sole in character.soles)
         if soles:
             reports.append(("INFO", translated("Added '{name}' with {soles}", name=character.name, soles=soles)))
+            size = import_fixes.sizes_of(scene.unit_settings.scale_length, character)[1]
+            if size > 0 and character.skin_mass > 0:  # one that is larger in its file than in life weighs tons
+                size_and_mass = {"name": character.name, "size": f"{size:.2g}", "mass": f"{character.mass:g}"}
+                reports.append(("INFO", translated("'{name}': {size} m in size, {mass} kg", **size_and_mass)))
         elif rig_checks.is_animated(character.armature) and skin_sampling.meshes_on(scene.objects, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {rig_mapping.CHOOSE_CONTACTS}"))

@@ -53,13 +53,14 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     numbers = {sole.sole.name: number for number, sole in enumerate(motion.soles)}
     owner = np.array([numbers.get(name, -1) for name in skin.soles])
     absent: dict[str, int] = {}
+    idle: dict[str, int] = {}
     aloft: dict[str, int] = {}
     for number in np.unique(owner[owner >= 0]):
         yield
         of_sole, on = owner == number, touching[:, number]
         name = motion.soles[number].sole.name
         bears = np.where(touching.any(axis=1), max(RESTS * slow, LEAST_FRAMES), longest)  # or it brushes the ground
-        absent |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
+        idle |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
     least = max(RESTS * slow, LEAST_FRAMES)
     lengths = [sole.sole.length for sole in motion.soles]
@@ -71,12 +72,16 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
             alone[alone] = ~_beside(skin.position[alone, part, :2], marks, lengths, touching, alone)
             absent |= _first(skin.bones[part] or motion.name, alone, least)
     findings = [*_doubled(character, skin.height)]
-    for parts, code, what, remedy in (
-        (absent, "skin_without_step", "rests on the ground without a print", "add what rests there to its contacts."),
-        (aloft, "step_without_skin", "prints while its skin is in the air", "check the bone of each."),
+    without = "rests on the ground without a print"
+    slides = "see whether it slides there too fast for a step, or has the wrong bone."
+    for parts, kind, code, what, remedy in (
+        (absent, "", "skin_without_step", without, "add what rests there to its contacts."),
+        (idle, "The contact ", "contact_without_step", without, slides),
+        (aloft, "", "step_without_skin", "prints while its skin is in the air", "check the bone of each."),
     ):
         if parts:
-            message = f"{listed(parts)} of '{motion.name}' {what}, from frame {skin.frames[min(parts.values())]:.0f} on"
+            first = skin.frames[min(parts.values())]
+            message = f"{kind}{listed(parts)} of '{motion.name}' {what}, from frame {first:.0f} on"
             findings.append(Finding(code, "warning", message, remedy, {"character": motion.name, "parts": [*parts]}))
     return findings
 

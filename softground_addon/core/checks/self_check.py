@@ -14,7 +14,7 @@ from ..imprints.sole_points import places, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.hovering import hovering
 from ..loads.missed_steps import advice, missed_steps
-from ..loads.sliding import treadmill_speed
+from ..loads.sliding import treadmill_speed, uneven_slides
 from ..motion.motion import CharacterMotion
 from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
@@ -140,6 +140,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "Use the animation with its root motion.",
             {"character": motion.name, "speed": round(belt, 3)},
         )
+    if uneven := uneven_slides(motion, character.contacts):
+        yield uneven
 
 
 def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
@@ -171,11 +173,12 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
     if not likely:
         likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "the length of its legs"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
+        size = f"is {motion.size:.2g} m in size and " if motion.size > 0 else ""
         yield Finding(
             "mass_of_size",
             "warning",
-            f"'{motion.name}' weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
-            "Give it its mass.",
+            f"'{motion.name}' {size}weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
+            "Give it its mass, or scale it if that is not its size.",
             {"character": motion.name, "mass": motion.mass, "likely": float(f"{likely:.2g}")},
         )
 

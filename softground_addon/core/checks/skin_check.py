@@ -30,7 +30,8 @@ BESIDE = 0.15
 DISAGREE = 0.15
 """Share of steps without skin, and of frames of rest without a step, that is no fault: brushes, ends of contacts."""
 LEAST_REST = 3
-"""Frames of rest without a step that are no fault: the ends of contacts are rounded."""
+"""Frames of rest without a step that are no fault: the ends of contacts are rounded. Of a step that an end of the shot
+cuts, fewer frames do not tell whether its foot comes to rest."""
 BIN = 0.004
 """Step of the levels that are tried, in body heights (`skin.ground_level.BIN`)."""
 STANDING_PERCENTILE = 20.0
@@ -170,10 +171,11 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
         reach = max(BESIDE * height, sole.sole.length)
         first, last = np.searchsorted(frames, [step.start_frame - 1, step.end_frame + 1 + 1e-6])
         covered[first:last] |= touching.near(step, slice(first, last), reach)
-        if sole.bears is not None:
+        is_cut = (first == 0) != (last == len(frames))  # its middle may be beyond that end of the shot
+        if sole.bears is not None and not (is_cut and step.end_frame - step.start_frame < LEAST_REST):
             middle = step.middle(frames)
             checked += 1
-            if not touching.near(step, slice(middle, middle + 1), reach).any():
+            if not touching.near(step, slice(first, last) if is_cut else slice(middle, middle + 1), reach).any():
                 without_skin.append(step.start_frame)
     findings = []
     if len(without_skin) > DISAGREE * checked:

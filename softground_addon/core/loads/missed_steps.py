@@ -51,7 +51,8 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
     -------
     list of MissedStep
         In the order of time. Those of a foot that comes down beside the ground while the other stands on it are
-        among them only where the ground ends.
+        among them only where the ground ends, as are those of a walk on the spot whose foot stands at other times: it
+        treads the same place again.
     """
     if motion.centre is not None:
         return []  # a prop may lie anywhere
@@ -64,7 +65,8 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
             during = slice(first, last)
             if last - first < shortest or contacts.standing[during, number].any():
                 continue
-            if not carried[during].any() or np.isinf(clearance[during]).all():
+            swings = carried[during].any() or (belt.any() and contacts.standing[:, number].any())
+            if not swings or np.isinf(clearance[during]).all():
                 height = float(np.median(clearance[during]))
                 missed.append(MissedStep(sole.sole.name, float(motion.frames[first]), height))
     return sorted(missed, key=lambda step: step.frame)

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.characters import import_fixes
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.contact_editing import add_bone_contacts, add_object_contacts
 from softground_addon.blender.characters.import_fixes import has_legs
@@ -115,11 +116,23 @@ def test_the_panel_suggests_the_mass_where_the_field_differs_much(scene):
     assert not suggested_mass(character)
 
 
+def test_the_size_is_said_that_makes_a_body_heavy_when_it_is_added_and_where_its_mass_is_questioned(scene, capfd):
+    """An animal of 2 t is 8 m long in its file: scaling is the remedy, not its mass."""
+    shots.walker(scene).scale = (5.0, 5.0, 5.0)
+    bpy.context.view_layer.update()
+    character = added(scene)
+    size = import_fixes.sizes_of(1.0, character)[1]
+    assert 8.0 < size < 9.0
+    assert f"{size:.2g} m in size, {character.mass:g} kg" in capfd.readouterr().out
+
+
 def test_a_mass_that_does_not_suit_the_body_is_pointed_out(short_walk):
     character = short_walk.softground.characters[0]
     character.mass = 10 * character.skin_mass
     (finding,) = [each for each in bake(short_walk).report["self_check"] if each["code"] == "mass_of_size"]
     assert f"the volume of its skin suggests about {character.skin_mass:g} kg" in finding["message"]
+    assert "' is 1.8 m in size and weighs" in finding["message"]
+    assert "scale" in finding["remedy"]
 
 
 def test_a_body_scaled_after_it_was_added_is_weighed_at_its_new_size(short_walk):

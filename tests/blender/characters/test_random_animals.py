@@ -21,7 +21,7 @@ TOLERANCE = 0.067
 SLOWEST = 2.0
 UNSEEN = 0.05
 """Time by which a contact may miss its bounds and need not be named [s]: a foot that begins to lift still rests."""
-CODES = {"skin_without_step", "step_without_skin", "foot_twice"}
+CODES = {"skin_without_step", "contact_without_step", "step_without_skin", "foot_twice"}
 FEWEST = 0.75
 """Share of the frames in which a foot stands that a contact has at least which is late or short and no miss."""
 

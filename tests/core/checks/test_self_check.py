@@ -116,7 +116,10 @@ def test_each_contact_is_judged_by_its_own_skin_and_named():
     touching = loads.contacts.touching.copy()
     touching[:, 1] = False
     missing = replace(loads, contacts=replace(loads.contacts, touching=touching))
-    assert "'right', 'tail' of" in findings_of(missing)["skin_without_step"].message
+    said = findings_of(missing)
+    assert "'tail' of" in said["skin_without_step"].message
+    assert "The contact 'right' of 'walker'" in said["contact_without_step"].message
+    assert "add" not in said["contact_without_step"].text.lower()  # it is in the list already
     aloft = np.add(apart[:2], [[0, 0, 0.1], [0, 0, 0]])
     over = named(stands(aloft, apart[:2]), ("foot.L", "foot.R"), ("left", "right"))
     assert "'left' of" in findings_of(over)["step_without_skin"].message
@@ -155,6 +158,22 @@ def test_a_step_whose_skin_has_sunk_into_the_ground_is_that_skins(depth, agrees)
     sunk.position[middle - 3 : middle + 4, 0, 2] -= depth
     findings = findings_of(replace(loads, motion=replace(loads.motion, skin=sunk)))
     assert ("step_without_skin" not in findings) == agrees
+
+
+@pytest.mark.parametrize("at_end", [True, False])
+@pytest.mark.parametrize(("lasts", "rests", "agrees"), [(2, 0, True), (8, 3, True), (8, 0, False)])
+def test_a_step_that_an_end_of_the_shot_cuts_wants_skin_at_some_time_and_none_where_it_is_a_moment(
+    lasts, rests, agrees, at_end
+):
+    """What lands in the last frames, or leaves in the first, shows nothing of its middle."""
+    loads = stands()
+    frames, skin = loads.motion.frames, loads.motion.skin
+    from_end = frames[-1] - frames if at_end else frames - frames[0]
+    touching = loads.contacts.touching.copy()
+    touching[:, 1] = from_end <= lasts
+    skin.rise[:, 1] = np.where(from_end[loads.motion.on_frames] <= rests - 1, 0.0, 1.0)
+    cut = replace(loads, contacts=replace(loads.contacts, touching=touching))
+    assert ("step_without_skin" not in findings_of(cut)) == agrees
 
 
 def test_a_foot_that_bears_on_the_edge_of_its_sole_leaves_no_print_and_says_so():

@@ -85,6 +85,25 @@ def test_in_a_run_on_the_spot_a_foot_rests_that_moves_with_the_belt_and_none_tha
     assert [step.sole for step in missed_steps(motion, contacts)] == ["away"] * steps
 
 
+@pytest.mark.parametrize("lands", [True, False])
+def test_a_foot_of_a_walk_on_the_spot_that_treads_the_ground_elsewhile_misses_none_when_it_lifts(lands):
+    """It goes on with the belt for a while after toe-off, when nothing else carries the body."""
+    time = np.arange(0, 2.4, 1 / RATE)
+    phase = (time / 0.8 + (0.0 if lands else 0.6)) % 1.0
+    forth = np.where(phase < 0.6, -phase, -0.6 + 1.5 * (phase - 0.6))
+    up = np.where((phase > 0.3) & (phase < 0.6), 0.06, np.where(phase < 0.6, 0.0, 0.2))
+    motion = character([flat_sole(np.stack([forth, 0 * time, up], axis=-1))], hips=(0, 0, 0.9), rate=RATE)
+    touching = (lands & (phase < 0.3))[:, None]
+    belt = np.stack([-1.25 * time, 0 * time - 0.2, 0 * time], axis=-1)  # of a foot that is down all the time
+    motion = replace(motion, soles=(*motion.soles, flat_sole(belt, name="belt")))
+    touching = np.concatenate([touching, (phase < 0.05)[:, None]], axis=1)
+    clearance = np.stack([up, 0 * up], axis=-1)
+    contacts = Contacts(touching, np.zeros(2), np.broadcast_to((0.0, 0.0, 1.0), (*touching.shape, 3)), clearance)
+    assert treadmill_speed(motion, contacts) == pytest.approx(1.25, rel=0.05)
+    missed = [step.sole for step in missed_steps(motion, contacts) if step.sole != "belt"]
+    assert bool(missed) == (not lands)
+
+
 def test_the_advice_names_how_many_since_when_and_what_to_do():
     missed = missed_in(walked(), Slope(edge=3.0))
     text = advice("Walker", missed, "'Field'").text

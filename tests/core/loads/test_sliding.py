@@ -7,7 +7,7 @@ import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.loads.contacts import detect_contacts
-from softground_addon.core.loads.sliding import treadmill_speed
+from softground_addon.core.loads.sliding import treadmill_speed, uneven_slides
 from tests.core.walkers import walk
 
 BELT = np.array([-1.1, 0.4, 0.0])
@@ -76,3 +76,43 @@ def test_skates_that_take_the_body_along_are_no_belt():
     )
     assert speed_of(still) == 0.0
     assert speed_of(carried(still, BELT)) == 0.0
+
+
+@pytest.mark.parametrize("travels", [False, True])
+@pytest.mark.parametrize(("share", "is_said"), [(1.0, False), (0.8, False), (0.4, True), (0.0, False)])
+def test_feet_of_a_cycle_that_slide_at_different_speeds_are_said_with_both(share, is_said, travels):
+    """Forefeet that slide as fast as the hind ones, or less, under a body on the spot or with some travel of its own;
+    and a tail that goes along with it."""
+    motion = on_the_spot(walk(steps=8).motion)
+    contacts = detect_contacts(walk(steps=8).motion, FlatTerrain())
+    soles = list(motion.soles)
+    for sole in motion.soles:
+        poses = sole.transforms.copy()
+        poses[..., 0, 3] *= share
+        soles.append(replace(sole, transforms=poses, sole=replace(sole.sole, name=f"fore{sole.sole.name}")))
+    cycle = replace(motion, soles=tuple(soles))
+    cycle = carried(cycle, (0.4, 0.0, 0.0)) if travels else cycle
+    said = uneven_slides(cycle, replace(contacts, touching=np.tile(contacts.touching, 2)))
+    assert (said is not None) == is_said
+    if said:
+        speeds = {("fore" in name): speed for name, speed in said.facts["speeds"].items()}
+        belt = 0.4 if travels else 0.0
+        assert speeds[False] == pytest.approx(1.3 - belt, abs=0.15)
+        assert speeds[True] == pytest.approx(abs(0.52 - belt), abs=0.15)
+        assert f"{said.facts['speeds'][max(said.facts['speeds'], key=said.facts['speeds'].get)]:.2g} m/s" in said.text
+
+
+def test_sound_walks_skates_and_a_foot_that_drags_are_not_uneven():
+    sound = walk(steps=8).motion
+    contacts = detect_contacts(sound, FlatTerrain())
+    assert uneven_slides(sound, contacts) is None
+    time = sound.times[:, None]
+    skates = carried(sound, (0.0, 0.0, 0.0))
+    for sole, side in zip(skates.soles, (-2.0, 2.0), strict=True):
+        sole.transforms[..., :3, 3] = (time * (7.0, side, 0.0))[:, None]
+    skates = replace(skates, joints={"hips": time * (7.0, 0.0, 0.0) + (0.0, 0.0, 0.9)})
+    assert uneven_slides(skates, contacts) is None
+    drags = on_the_spot(sound)
+    touching = contacts.touching.copy()
+    touching[:, 1] = True
+    assert uneven_slides(drags, replace(contacts, touching=touching)) is None
