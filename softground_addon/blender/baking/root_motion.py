@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ...core.checks.uneven_slides import uneven_slides
 from ...core.errors import InputError
-from ...core.loads.sliding import uneven_slides
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.arrays import Array
 from ...core.response.root_motion import lacking_velocity

@@ -14,7 +14,7 @@ from ..imprints.sole_points import places, sole_points
 from ..loads.estimate import CharacterLoads
 from ..loads.hovering import hovering
 from ..loads.missed_steps import advice, missed_steps
-from ..loads.sliding import treadmill_speed, uneven_slides
+from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion
 from ..motion.people import MASS_RANGE, PERSON_MASS, likely_mass
 from ..motion.sole_motion import shortest_length
@@ -22,6 +22,7 @@ from ..motion.units import scale_to_metres, wrong_unit
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from .skin_check import OFF_SKIN, level_on_slope, skin_check
+from .uneven_slides import uneven_slides
 
 PERSON_LEG = 0.87
 """A person of 1.78 m, hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""

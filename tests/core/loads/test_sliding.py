@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.checks.uneven_slides import uneven_slides
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.loads.contacts import detect_contacts
-from softground_addon.core.loads.sliding import treadmill_speed, uneven_slides
+from softground_addon.core.loads.sliding import treadmill_speed
 from tests.core.walkers import walk
 
 BELT = np.array([-1.1, 0.4, 0.0])
