@@ -250,9 +250,8 @@ def _given_way(
     place = in_cells(graph, table, root)
     found, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
     place = place.socket
-    snow = graph.number(
-        graph.choose("FLOAT", table.sinks, graph.attribute(RAISED), 0.0)
-    )  # that lifts what stands on it
+    # Height by which snow lifts what stands on it, where that does not sink by itself.
+    snow = graph.number(graph.choose("FLOAT", table.sinks, graph.attribute(RAISED), 0.0))
     is_lifted = snow.above(0.0)
     is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, found, is_lifted.socket, domain), 0)
     is_near = graph.either(table.is_windy.socket, any_of(graph, found, is_over(graph, table, place), domain))

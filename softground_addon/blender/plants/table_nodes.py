@@ -115,24 +115,13 @@ def in_cells(graph: NodeGraph, table: Table, root: Any) -> Any:
     Where scatter and table are turned alike, parts of the vector are scaled, in half the time.
     """
     axes = [graph.separated(axis) for axis in (*table.axes, table.up)]
-    turned = sum(
-        (
-            graph.number(graph.math("ABSOLUTE", part))
-            for i, axis in enumerate(axes)
-            for j, part in enumerate(axis)
-            if i != j
-        ),
-        graph.number(0.0),
-    )
-    scales, origin = (
-        graph.combined(*(axes[i][i] for i in range(3))),
-        graph.vector("MULTIPLY", table.origin, (1.0, 1.0, 0.0)),
-    )
+    beside = [part for i, axis in enumerate(axes) for j, part in enumerate(axis) if i != j]
+    turned = sum((graph.number(graph.math("ABSOLUTE", part)) for part in beside), graph.number(0.0))
+    scales = graph.combined(*(axes[i][i] for i in range(3)))
+    origin = graph.vector("MULTIPLY", table.origin, (1.0, 1.0, 0.0))
+    scaled = graph.vector("MULTIPLY_ADD", root, scales, origin)
     whole = graph.combined(*(graph.dot(root, axis) for axis in (*table.axes, table.up)))
-    turned_there = graph.vector("ADD", whole, origin)
-    return graph.choose(
-        "VECTOR", turned.above(0.0).socket, graph.vector("MULTIPLY_ADD", root, scales, origin), turned_there
-    )
+    return graph.choose("VECTOR", turned.above(0.0).socket, scaled, graph.vector("ADD", whole, origin))
 
 
 def slot_of(graph: NodeGraph, table: Table, place: Any) -> Any:
