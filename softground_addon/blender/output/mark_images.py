@@ -60,10 +60,10 @@ class FloorImage:
         """Mass [kg/m²], wet look from 1 to 0, and time since the latest mark [s], (N + 1, 3); last, of all others."""
         surface = surfaces.sticking(marks_object.floors_of(self.marks).kind)
         sliders = marks_object.sliders_of(self.marks, frame * self.units.time_stretch)
-        there = (self.birth <= frame) & (self.mass > 0)
-        place, seconds = self.place[there], (frame - self.birth[there]) / self.units.frame_rate
+        made = (self.birth <= frame) & (self.mass > 0)
+        place, seconds = self.place[made], (frame - self.birth[made]) / self.units.frame_rate
         passed = seconds * sliders["Time Scale"]
-        now = aged(self.mass[there], passed, surface, *(sliders[name] for name in ("Drying", "Rain", "Temperature")))
+        now = aged(self.mass[made], passed, surface, *(sliders[name] for name in ("Drying", "Rain", "Temperature")))
         channels = np.zeros((len(self.index) + 1, 3))
         channels[:, 2] = np.inf
         np.add.at(channels[:, 0], place, now.mass)
@@ -113,7 +113,7 @@ def _in_world(obj: bpy.types.Object, place: Any) -> Array:
 def _uv_of(floor: bpy.types.Object, place: Array, near: float) -> Array:
     """Places (N, 2) in the UV map of a floor, NaN where it is not near [Blender units] or has none."""
     shown: Any = floor.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh, found = shown.to_mesh(), np.full((len(place), 2), np.nan)
+    mesh, uv = shown.to_mesh(), np.full((len(place), 2), np.nan)
     layer = next((each for each in mesh.uv_layers if each.active_render), None) if mesh else None
     if layer is not None:
         corners = [each.vector.to_3d() for each in layer.uv]
@@ -126,6 +126,6 @@ def _uv_of(floor: bpy.types.Object, place: Array, near: float) -> Array:
             if on is not None:
                 of_vertices, of_corners = triangles[triangle]
                 ends = [at[each] for each in of_vertices] + [corners[each] for each in of_corners]
-                found[number] = barycentric_transform(on, *ends)[:2]
+                uv[number] = barycentric_transform(on, *ends)[:2]
     shown.to_mesh_clear()
-    return found
+    return uv

@@ -166,7 +166,7 @@ class SOFTGROUND_PT_of_character(CharacterPanel, bpy.types.Panel):
             for field in ("mass", "dirty_soles", *dirt, "force_model"):
                 layout.prop(character, field)
             return
-        number, other = next(found for found in enumerate(options.characters) if belongs_to(found[1], obj))
+        number, other = next(pair for pair in enumerate(options.characters) if belongs_to(pair[1], obj))
         text = translated("Choose '{name}'", name=character_setup.title_of(other))
         button = layout.operator("wm.context_set_int", text=text, icon="ARMATURE_DATA", translate=False)
         button.data_path, button.value = "scene.softground.active_character", number

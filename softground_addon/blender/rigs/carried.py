@@ -61,7 +61,7 @@ def _on_bone(obj: bpy.types.Object, bone: bpy.types.Bone) -> Array:
 
 def _held(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     """The same of an object that follows a bone by its only constraint."""
-    (constraint, *others), own = _active(obj), np.array(obj.matrix_basis)
+    (constraint, *others), basis = _active(obj), np.array(obj.matrix_basis)
     each: Any = constraint
     target: Any = each
     if each.type == "ARMATURE":
@@ -72,11 +72,11 @@ def _held(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     if each.type == "COPY_TRANSFORMS" and each.mix_mode == "REPLACE":
         return bone.name, np.array(bone.matrix_local)
     if each.type == "CHILD_OF" and obj.parent is None:
-        return bone.name, np.array(bone.matrix_local) @ np.array(each.inverse_matrix) @ own
+        return bone.name, np.array(bone.matrix_local) @ np.array(each.inverse_matrix) @ basis
     if each.type == "ARMATURE" and obj.parent == armature:
-        return bone.name, np.array(obj.matrix_parent_inverse) @ own
+        return bone.name, np.array(obj.matrix_parent_inverse) @ basis
     if each.type == "ARMATURE" and obj.parent is None and _stands(armature):
-        return bone.name, np.linalg.pinv(world_matrix(armature)) @ own
+        return bone.name, np.linalg.pinv(world_matrix(armature)) @ basis
     return None
 
 

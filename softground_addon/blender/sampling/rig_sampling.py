@@ -22,7 +22,8 @@ from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
 from ...core.rig.recording import Recording, SceneUnits
 from ...core.rig.rig_skin import RigSkin
-from ...core.rig.skin_stances import LONGEST, skin_stances
+from ...core.rig.skin_stances import skin_stances
+from ...core.skin.skin_motion import MOST_SAMPLES
 from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
 from ..placement import units_about
@@ -127,7 +128,7 @@ def sample_character(
         skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
         armature = resolve(rig)
     units = units or units_about(scene, armature)
-    bones += skin.bones if skin and len(frames) <= LONGEST else ()
+    bones += skin.bones if skin and len(frames) <= MOST_SAMPLES else ()
     shapes = [shape.key for shape in skin.shapes] if skin else []
     recording = yield from record(scene, armature, frames, bones, units, props, shapes, below=below, findings=findings)
     if poses:
@@ -152,7 +153,7 @@ def recorded_motion(
     Parameters
     ----------
     recording : Recording
-        Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `LONGEST` samples.
+        Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `MOST_SAMPLES` samples.
     scene, armature, mapping, mass, skin_mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """
@@ -178,7 +179,7 @@ def _motion(
     carried: Mapping[str, SoleMotion],
 ) -> Sampling:
     count, stances = len(recording.frames), None
-    if skin and count <= LONGEST:
+    if skin and count <= MOST_SAMPLES:
         step = float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
         looking = skin_stances(skin, bones, mapping, recording, recording.units.frame_rate / step, mass=skin_mass)
         stances = yield from meanwhile(count, looking)

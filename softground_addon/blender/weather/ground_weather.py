@@ -177,7 +177,7 @@ def _fit(
     tree: Any,
     footprints: list[Footprint],
     about: Mapping[str, Any],
-    found: tuple[WeatherPlaces, WeatherRegions, Indices],
+    read: tuple[WeatherPlaces, WeatherRegions, Indices],
 ) -> Slices[None]:
     """Fill the group, and write what it reads in the last slice."""
     with damage_named(ground):
@@ -186,7 +186,7 @@ def _fit(
         first, last = (frame * units.time_stretch for frame in baked_ground.frames_of(inputs))
         rate = units.frame_rate * units.time_stretch
     up = ground_surface.up_of(display_mesh, units.unit_scale_m, units.frame)
-    places, of_ground, kinds = found
+    places, of_ground, kinds = read
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate)
     mesh = ground_mesh.mesh_of(display_mesh)

@@ -169,7 +169,7 @@ class _Body:
     ) -> None:
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
-        self._left: list[int] = []
+        self._away: list[int] = []
         """Frame from which the sole of each part is away from its last step."""
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
         every = list(skin.triangles.values())
@@ -185,8 +185,8 @@ class _Body:
                 of_used = np.searchsorted(used, triangles[is_near].T)
                 nearest = _nearest(taken, skin.frames)
                 self._parts.append((sole, taken, nearest, *numbered(of_used, len(used)), sides[is_near]))
-                left = taken[nearest[-1]].footprint.end_frame + AWAY * skin.frame_rate
-                self._left.append(int(np.searchsorted(skin.frames, left)))
+                away = taken[nearest[-1]].footprint.end_frame + AWAY * skin.frame_rate
+                self._away.append(int(np.searchsorted(skin.frames, away)))
 
     def parts(self, number: int) -> list[Part]:
         """The step that each part is nearest to at a frame, with the part."""
@@ -197,8 +197,8 @@ class _Body:
         before = max(number - 1, 0)
         return [
             taken[nearest[before]]
-            for (sole, taken, nearest, *_), left in zip(self._parts, self._left, strict=True)
-            if sole != NO_SOLE and (nearest[before] != nearest[number] or number == left)
+            for (sole, taken, nearest, *_), away in zip(self._parts, self._away, strict=True)
+            if sole != NO_SOLE and (nearest[before] != nearest[number] or number == away)
         ]
 
 

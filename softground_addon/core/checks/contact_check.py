@@ -129,11 +129,11 @@ def _doubled(character: CharacterLoads, height: float) -> Iterator[Finding]:
     motion, touching = character.motion, character.contacts.touching
     pairs = [
         [this.sole.name, other.sole.name]
-        for (one, this), (two, other) in combinations(enumerate(motion.soles), 2)
+        for (first, this), (second, other) in combinations(enumerate(motion.soles), 2)
         if {this.sole.side, other.sole.side} != {"L", "R"}
         and this.bears is not None
         and other.bears is not None
-        and _are_one(this, other, touching[:, one], touching[:, two], height)
+        and _are_one(this, other, touching[:, first], touching[:, second], height)
     ]
     if pairs:
         message = f"{listed(pairs[0])} of '{motion.name}' press the same place at the same time: one foot, twice"

@@ -44,11 +44,11 @@ def uneven_slides(motion: CharacterMotion, contacts: Contacts) -> Finding | None
     if part[slowest] > ALIKE or most * (1.0 - part[slowest]) < slowest_belt(velocities, motion):
         return None
     speeds = {motion.soles[feet[n]].sole.name: round(float(np.linalg.norm(slides[n])), 3) for n in (fastest, slowest)}
-    one, other = (f"'{name}' slides at {speed:.2g} m/s" for name, speed in speeds.items())
+    fast, slow = (f"'{name}' slides at {speed:.2g} m/s" for name, speed in speeds.items())
     return Finding(
         "uneven_slides",
         "warning",
-        f"No speed lets all feet of '{motion.name}' rest: while planted, {one}, and {other}.",
+        f"No speed lets all feet of '{motion.name}' rest: while planted, {fast}, and {slow}.",
         "Use an animation whose feet slide alike, or plant them by keys.",
         {"character": motion.name, "speeds": speeds},
     )

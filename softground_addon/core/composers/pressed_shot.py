@@ -138,8 +138,8 @@ def shares_of(
         of_ground = loads
         if number and not all(same):
             of_ground = yield from loads_of_shot.slices(made_with, motions, terrain, known)
-        on = [under[id(one)] if id(one) in under else grounds_under(one, several) for one in of_ground]
-        shares.append([loads_on(one, where, number) for one, where in zip(of_ground, on, strict=True)])
+        on = [under[id(each)] if id(each) in under else grounds_under(each, several) for each in of_ground]
+        shares.append([loads_on(each, where, number) for each, where in zip(of_ground, on, strict=True)])
         yield
     return shares
 

@@ -53,7 +53,7 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
         return None
     place = vertices[:, :2]
     low, high = place.min(axis=0), place.max(axis=0)
-    one, other = np.random.default_rng(0).integers(2**63, size=(2, len(vertices)), dtype=np.uint64)
+    first, second = np.random.default_rng(0).integers(2**63, size=(2, len(vertices)), dtype=np.uint64)
     sum_of_edges = np.zeros(1, dtype=np.uint64)  # each adds what it takes off the other way round
     for number in range(0, len(triangles), PLACES_AT_ONCE):
         yield
@@ -65,7 +65,7 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
         at, to = place[begin], place[end]
         inner = ~((at == to) & ((at == low) | (at == high))).any(axis=1)
         begin, end = begin[inner], end[inner]
-        sum_of_edges += (one[begin] * other[end] - one[end] * other[begin]).sum()
+        sum_of_edges += (first[begin] * second[end] - first[end] * second[begin]).sum()
     if sum_of_edges.any():
         return None
     return FlatTerrain(float(vertices[0, 2]), tuple(low.tolist()), tuple(high.tolist()))

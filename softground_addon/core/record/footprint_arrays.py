@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import damaged_record
 from ..ground.sparse_grid import Window
 from ..ground.surfaces import SURFACES
+from ..skin.skin_motion import MOST_SAMPLES
 from . import contact_arrays
 from .contact_steps import ContactSteps
 from .footprints import Changes, Footprint
@@ -181,8 +182,6 @@ SPARE_CELLS = 2**20
 """Most cells of a window for each change in it, and on top of that: windows beyond would only fill the memory."""
 LONGEST_PAUSE = 10
 """Most recorded frames that a footprint's changes span, for each that has a change or a load, on top of a carve's."""
-LONGEST_CARVE = 3000
-"""Frames of the longest shots in which bodies carve (`rig.skin_stances`): they may come by again much later."""
 
 
 def _check(footprint: Footprint) -> None:
@@ -223,5 +222,5 @@ def _check_ranges(footprint: Footprint) -> None:
             raise ValueError(f"{name} is {getattr(footprint, name):g}")
     frames = np.concatenate([footprint.compression.frames, footprint.rim.frames])
     longest = LONGEST_PAUSE * (len(frames) + len(footprint.load_frames)) * footprint.frame_step
-    if len(frames) and np.ptp(frames) > LONGEST_CARVE + longest:
+    if len(frames) and np.ptp(frames) > MOST_SAMPLES + longest:
         raise ValueError("frames are too far apart")

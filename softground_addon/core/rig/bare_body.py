@@ -14,13 +14,14 @@ from ..numerics.arrays import Array, Indices
 from ..numerics.rigid import unit
 from ..numerics.slices import Slices, sliced
 from ..skin.rigid_parts import moves_as_one, rigid_motions, rigid_parts
+from ..skin.skin_motion import MOST_SAMPLES
 from .bones import RestBone, RigBones
 from .mapping import RigMapping, SoleSource
 from .motion_assembly import assemble_motion
 from .recording import Recording, SceneUnits
 from .rig_skin import RigSkin
 from .skin_mass import centre_of_volume
-from .skin_stances import LONGEST, skin_stances
+from .skin_stances import skin_stances
 
 MOST_FOLLOWED = 100
 """Points of a part by which it is followed."""
@@ -194,7 +195,7 @@ def body_motion(
     """
     bones, recording = _jointed(body, mapping, recording)
     count, stances = len(recording.frames), None
-    if count <= LONGEST:
+    if count <= MOST_SAMPLES:
         step = float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
         rate = recording.units.frame_rate / step
         stances = yield from skin_stances(body.skin, bones, mapping, recording, rate, mass=skin_mass)

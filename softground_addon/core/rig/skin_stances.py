@@ -23,9 +23,6 @@ UNDERSIDE = 0.02
 SOLE_BAND = 0.06
 """Faces that reach down to this over the ground are looked at for the sole, in body heights."""
 
-LONGEST = 3000
-"""Samples up to which the skin is followed."""
-
 
 @dataclass(frozen=True)
 class SkinStances:

@@ -28,6 +28,9 @@ LOW = 0.15
 LOOPS = 0.001
 """A shot whose last pose is its first one to within this is one turn of a loop, in body heights."""
 
+MOST_SAMPLES = 3000
+"""Samples of the longest shots in which the skin is followed."""
+
 _SLICE = 100_000
 """Places that are looked at in one slice."""
 

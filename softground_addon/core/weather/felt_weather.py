@@ -180,15 +180,15 @@ class RegionsInWeather:
     def levels(self, frame: float, x: Array, y: Array, /) -> Array:
         """Rise of open ground by a scene frame at places [m]."""
         levels = np.zeros(np.shape(x))
-        for there, kind in self._parts(x, y):
-            levels[there] = kind.level(frame)
+        for covered, kind in self._parts(x, y):
+            levels[covered] = kind.level(frame)
         return levels
 
     def aged(self, ground: HeightField, window: Window, **known: Any) -> Array:
         """Compression and rim of cells, as weather has left them by a frame; see `ground.soft_ground.Weathering`."""
         weathered = ground.read(window)
-        for there, kind in self._parts(*np.meshgrid(*window.centres(ground.cell_size))):
-            weathered[:, there] = kind.aged(ground, window, **known)[:, there]
+        for covered, kind in self._parts(*np.meshgrid(*window.centres(ground.cell_size))):
+            weathered[:, covered] = kind.aged(ground, window, **known)[:, covered]
         return weathered
 
     def _parts(self, x: Array, y: Array) -> Iterator[tuple[Mask, PrintsInWeather]]:
