@@ -237,6 +237,7 @@ SHOTS = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 LIKELY = st.fixed_dictionaries({"shots": st.lists(SHOTS, max_size=3)}, optional={"defaults": SHOTS})
 
 
+@pytest.mark.slow
 @given(LIKELY | VALUES)
 def test_no_content_makes_anything_but_shots_or_a_clear_error(content):
     shots, message = (), ""

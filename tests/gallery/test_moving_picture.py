@@ -49,6 +49,7 @@ class BakeAskedError(Exception):
     """What a bake would have been done with."""
 
 
+@pytest.mark.slow
 def test_two_clicks_bake_the_ground_of_the_readme_s_picture(addon, scene, monkeypatch):
     def ask(scene, write):
         raise BakeAskedError(settings.snapshot(scene).inputs())

@@ -74,18 +74,21 @@ def constants(node):
     return [each.value for each in ast.walk(node) if isinstance(each, ast.Constant)]
 
 
+@pytest.mark.slow
 def test_every_error_of_the_core_has_a_code():
     every = dict(codes(EVERY))
     assert len(every) > 50
     assert [place for place, kinds in every.items() if "" in (kinds or [""])] == []
 
 
+@pytest.mark.slow
 def test_the_docs_list_the_codes_of_the_library():
     page = (ROOT / "docs/library.md").read_text(encoding="utf-8").split("## Errors")[1].split("\n## ")[0]
     listed = "".join(line for line in page.splitlines() if line.startswith("| "))
     assert sorted(re.findall(r"`([a-z_]+)`", listed)) == sorted({code for _, each in codes(MODULES) for code in each})
 
 
+@pytest.mark.slow
 def test_remedies_of_the_panel_are_for_codes_of_the_core_and_fit_their_facts():
     """Facts that a remedy needs are given wherever its code is."""
     facts = {}
@@ -114,12 +117,14 @@ def test_an_error_comes_whole_from_another_process(error):
     assert (str(copied), copied.code, copied.facts) == (str(error), error.code, error.facts)
 
 
+@pytest.mark.slow
 def test_messages_of_the_core_name_no_part_of_the_panel():
     known = set(labels())
     assert {"Add Character", "Time Limit", "Cell Size", "Bake Footprints"} <= known
     assert [(path, text) for path, text in messages() if names(text, known)] == []
 
 
+@pytest.mark.slow
 def test_messages_of_the_blender_side_do_so_that_the_test_can_fail():
     known = set(labels())
     assert names("There is no character to bake: add one with 'Add Character'.", known)

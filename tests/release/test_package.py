@@ -32,6 +32,7 @@ def sources(folder):
     return folder
 
 
+@pytest.mark.slow
 def test_it_holds_the_extension_and_nothing_else(built):
     code = [path for kind in ("*.py", "*.json", "*.png") for path in (ROOT / "softground_addon").rglob(kind)]
     about = ("blender_manifest.toml", "__init__.py", "README.md", "LICENSE", "CHANGELOG.md")
@@ -71,6 +72,7 @@ def test_the_page_has_an_icon_a_featured_picture_and_six_more():
     assert all(width >= 1280 for width, _ in sizes["six "])
 
 
+@pytest.mark.slow
 def test_the_same_sources_give_the_same_bytes_whatever_their_times_and_rights(built, tmp_path):
     copy = sources(tmp_path / "copy")
     for number, path in enumerate(sorted(copy.rglob("*.py"), reverse=True)):

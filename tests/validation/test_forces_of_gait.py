@@ -48,6 +48,7 @@ def scored(trial: Trial, motion: CharacterMotion | None = None) -> Score:
     return score(forces_at_frames(motion), trial.forces, frames, weight=weight, rate=trial.rate)
 
 
+@pytest.mark.slow
 def test_errors_are_as_wide_as_their_standard_deviations_say():
     """Two thirds of all frames lie within one of them where it is right, 95 % within two."""
     inside = []
@@ -67,6 +68,7 @@ def test_errors_are_as_wide_as_their_standard_deviations_say():
     assert two > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [None, 48.0, 120.0])
 def test_no_cut_of_a_measured_motion_is_taken_for_keys_that_ease(rate):
     """As landings and push-offs might be, at the end of what is cut."""

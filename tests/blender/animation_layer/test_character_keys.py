@@ -59,6 +59,7 @@ def armature(scene, request):
     return MAKE[request.param](scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("armature", QUICK_AND_SLOW, indirect=True)
 def test_soles_stand_on_the_ground_that_they_pressed(armature):
     scene = bpy.context.scene
@@ -78,6 +79,7 @@ def test_soles_stand_on_the_ground_that_they_pressed(armature):
     assert jump < max(15.0, 1.2 * source_jump)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rig", "times"), [("walker", 0), ("ik", 1)])
 def test_a_rig_is_evaluated_once_for_its_motion_and_its_response_or_not_at_all(scene, monkeypatch, rig, times):
     armature, entered = MAKE[rig](scene), []
@@ -182,6 +184,7 @@ def test_baking_again_replaces_the_layer_and_reads_the_animation_without_it(scen
     assert sorted(action.name for action in bpy.data.actions) == actions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nla", ["strips alone", "off", "solo", "tweak", "tracks named like layers"])
 def test_whatever_the_users_nla_is_like_feet_sink_and_clear_gives_it_back(scene, nla):
     armature = shots.walker(scene)
@@ -222,6 +225,7 @@ def test_outside_its_frames_the_layer_does_nothing(scene):
     assert responders.world_matrices(scene, armature, ["hips", "foot.L"], [5, 65]) == pytest.approx(before, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_prints_only_leaves_the_character_and_response_only_leaves_the_ground(scene):
     armature = shots.walker(scene)
     set_up(armature)
@@ -243,6 +247,7 @@ def test_a_linked_rig_is_refused_with_a_remedy_and_untouched(scene, tmp_path):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_an_override_of_a_linked_character_responds(scene, tmp_path):
     shots.walker(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "asset.blend"))
@@ -339,6 +344,7 @@ def test_acting_raises_the_arms_or_the_knees_on_the_rig(scene):
     assert 0.8 < report["suggested_speed"]["Walker"] < 0.95
 
 
+@pytest.mark.slow
 def test_slowing_down_stretches_time_and_the_response_still_fits(scene):
     set_up(shots.walker(scene))
     result = responders.bake(scene)

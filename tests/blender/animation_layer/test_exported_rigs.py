@@ -49,6 +49,7 @@ def lowest(scene):
     return np.array(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_what_is_exported_is_what_is_seen(scene, tmp_path, suffix):
     write, read = FORMATS[suffix]

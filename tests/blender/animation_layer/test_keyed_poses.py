@@ -73,6 +73,7 @@ def assert_poses_equal_evaluated_ones(scene, armature):
             )
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1))
 def test_poses_of_random_rigs_are_those_that_blender_evaluates(addon, seed):

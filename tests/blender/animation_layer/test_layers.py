@@ -141,6 +141,7 @@ def test_a_key_set_after_a_bake_acts_at_once_and_is_the_users(scene, walker, tmp
     assert has_layer(armature)
 
 
+@pytest.mark.slow
 def test_cleaned_feet_also_sink_and_an_earlier_bake_is_outdated_by_the_cleaning(scene, walker):
     bpy.ops.softground.bake()
     assert bpy.ops.softground.clean_feet() == {"FINISHED"}
@@ -241,6 +242,7 @@ def test_a_layer_comes_along_without_the_add_on(scene, walker, tmp_path, link):
     assert np.array_equal(shown(bpy.context.scene, bpy.data.objects["Walker"]), poses)
 
 
+@pytest.mark.slow
 def test_an_override_keeps_its_layer_through_save_and_load(scene, tmp_path):
     responders.linked_walker(tmp_path)
     scene, armature = bpy.context.scene, bpy.data.objects["Walker"].override_create()
@@ -258,6 +260,7 @@ def test_an_override_keeps_its_layer_through_save_and_load(scene, tmp_path):
     assert np.abs(shown(scene, armature) - poses).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_two_characters_on_one_action_each_have_their_response(scene, walker):
     other = walker.copy()
     other.location.x = 3.0
@@ -315,6 +318,7 @@ def posed_as(armature, mode):
         bone.rotation_mode = mode
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["QUATERNION", "XYZ", "ZXY", "AXIS_ANGLE"])
 def test_made_keys_show_what_the_layers_showed_and_keep_the_users_action(scene, walker, mode):
     if mode != "QUATERNION":

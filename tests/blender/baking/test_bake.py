@@ -141,6 +141,7 @@ def test_a_character_that_leaves_no_print_is_pointed_out(walk):
         bake(walk)
 
 
+@pytest.mark.slow
 def test_nothing_is_baked_where_nobody_moves_and_a_statue_among_others_is_pointed_out(walk):
     walker = walk.softground.characters[0].armature
     statue = bpy.data.objects.new("Statue", walker.data)

@@ -85,6 +85,7 @@ def record_in(scene):
     return meshes, tables, actions, {key: value for key, value in report.items() if key != "timings"}
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
 @example([("preset", 1), ("relief", 3)])  # water, and then none
 @given(st.lists(st.tuples(st.sampled_from(sorted(CHANGES)), st.integers(1, 4)), min_size=2, max_size=4))
@@ -110,6 +111,7 @@ def presses(scene, change=lambda: None):
     return "prints" in anew(scene, change)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sink_feet", [False, True])
 def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again, sink_feet):
     bake(again, sink_feet=sink_feet)
@@ -117,6 +119,7 @@ def test_relief_look_and_shape_keys_leave_the_prints_as_they_are(again, sink_fee
         assert not presses(again, lambda name=name: CHANGES[name](again, 2)), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["debris", "pressure", "preset", "cell_size", "mass", "frames", "gravity", "keys", "shoes", "ground"]
 )
@@ -143,6 +146,7 @@ PRINTED = {"prints", "findings", "trail", "movements", "relief"}
 """What follows from other prints."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "follows"),
     [
@@ -165,6 +169,7 @@ def test_a_bake_works_out_only_what_follows_from_what_has_changed(again, name, f
         assert record_in(again) == (reuse.forget(), record_in(again))[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [0.05, 0.3])
 def test_landings_follow_the_time_that_the_ground_needs(again, value):
     again.softground.characters[0].force_model = "IMPULSE"
@@ -173,6 +178,7 @@ def test_landings_follow_the_time_that_the_ground_needs(again, value):
     assert record_in(again) == (reuse.forget(), record_in(again))[1]
 
 
+@pytest.mark.slow
 def test_what_is_held_is_bounded_and_given_back(again, monkeypatch):
     bake(again)
     held, sizes = reuse._size(*(each[1] for each in state.results.values())), dict(state.results)
@@ -199,6 +205,7 @@ def walk_without_ground(scene):
     scene.softground.relief, scene.softground.debris, scene.softground.cell_size = "FINE", True, 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "follows"),
     [

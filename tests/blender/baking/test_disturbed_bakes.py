@@ -142,6 +142,7 @@ def test_a_baked_mesh_whose_vertices_were_all_deleted_can_be_cleared(baked):
     assert "no faces" in refusal(bpy.ops.softground.bake)
 
 
+@pytest.mark.slow
 def test_what_is_left_of_a_bake_without_its_record_can_be_cleared(scene):
     shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()

@@ -59,6 +59,7 @@ def test_the_estimate_is_within_a_factor_of_two(case):
     assert 0.5 < median(ratios) < 2, ratios
 
 
+@pytest.mark.slow
 def test_a_bake_of_a_beetle_that_would_take_hours_is_refused_with_a_size_that_does_not(addon, capfd):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene

@@ -66,6 +66,7 @@ class Failure:
         return until_shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", slow_but_one([ON_COPY, ON_NEW, ON_ITSELF]))
 def test_nothing_is_left_of_a_bake_that_fails_before_it_is_shown(opened_as, where):
     count = Failure().run(bake_job.bake(opened_as(shot, where)))

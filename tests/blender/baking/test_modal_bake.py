@@ -374,6 +374,7 @@ def test_a_tick_asks_for_what_it_reads_without_walking_over_all_objects(scene):
     assert least_seconds(look) < least_seconds(walk_over_all_objects) / 5
 
 
+@pytest.mark.slow
 def test_a_shot_is_read_in_steps_and_leaves_no_trace_where_that_ends(scene):
     walker(scene, frames=40)
     bpy.ops.softground.add_character()

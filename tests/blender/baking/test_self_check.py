@@ -94,6 +94,7 @@ def walking_stool(scene):
     return scene
 
 
+@pytest.mark.slow
 def test_skin_that_rests_where_nothing_prints_is_pointed_out(walking_stool):
     assert not codes(bake(walking_stool).report) & {
         "skin_without_step",

@@ -93,6 +93,7 @@ def blocks():
     return {(kind, block.name) for kind in kinds for block in getattr(bpy.data, kind)}
 
 
+@pytest.mark.slow
 def test_marks_lie_on_the_crate_and_weigh_what_the_report_says(scene, baked):
     obj = marks_object.of(scene.softground.ground)
     assert obj.name == "SoftGround Marks"
@@ -144,6 +145,7 @@ def with_uv_map(crate, scale=1.0):
         layer.uv[loop.index].vector = top if z > size[2] / 2 else (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_images_in_the_uv_map_of_a_floor_have_the_marks_as_they_are_shown(scene, tmp_path):
     obj, crate = in_files(marks_object.of(scene.softground.ground)), bpy.data.objects["Crate"]
     size = np.array(crate.dimensions)
@@ -405,6 +407,7 @@ def test_a_bake_that_leaves_none_takes_older_ones_away(scene, change):
     assert "carried_kg" not in result.report["totals"]
 
 
+@pytest.mark.slow
 def test_without_hard_ground_or_switched_off_a_bake_is_as_before_bit_for_bit(opened_as):
     scene = opened_as(over_a_muddy_crate)
     covered = {}

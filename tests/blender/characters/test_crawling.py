@@ -112,6 +112,7 @@ def crawler(family: rigs.Family) -> bpy.types.Object:
     return armature
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [True, False])
 def test_hands_knees_and_feet_of_who_crawls_print_as_they_stand(scene, named):
     scene.render.fps = RATE

@@ -95,6 +95,7 @@ def test_the_scale_of_a_character_is_on_one_empty_however_often_it_is_put_right(
         assert (armature.parent.name, armature.parent.parent) == ("Walker Scale", None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [0.0, 2.0])
 def test_walk_ahead_a_second_time_acts_on_the_empty_of_the_first(scene, turned):
     armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
@@ -155,6 +156,7 @@ def share(animation):
         animation.action_slot = None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [push_down, leave_one_key, delete_ways, mute, share])
 def test_walk_ahead_takes_a_new_empty_where_the_curves_of_the_first_do_not_move_it_or_move_others(scene, spoil):
     armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)

@@ -98,6 +98,7 @@ def misses(animal: Animal) -> list[str]:
     return seen(animal).wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "count", "right"),
     [
@@ -154,6 +155,7 @@ def with_twin(values, number):
     return np.concatenate([values, np.take(values, [number], axis)], axis)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "period"), [(0.12, 0.57), (7.4, 2.1), (1.0, 3.0)])
 def test_a_walk_on_the_spot_is_one_however_slow_it_is(addon, size, period):
     """Its feet slide no faster than those of others that stand."""
@@ -166,6 +168,7 @@ def test_toes_and_knees_are_those_of_their_own_leg_where_several_have_such_names
     assert not misses(replace(Animal.drawn(3), legs=6, foot="free", names="named", toes=True))
 
 
+@pytest.mark.slow
 def test_feet_that_tremble_and_slide_print_while_their_skin_stands(addon):
     """As a network or a capture without a filter leaves them: their speed does not tell when they stand."""
     large = replace(Animal.drawn(1208), legs=4, size=5.8, unit=1.0, rate=120, period=2.57, duty=0.64, stride=0.3)

@@ -51,6 +51,7 @@ def test_the_copied_command_bakes_what_the_button_bakes_whatever_the_names(scene
     assert baked_ground() == pressed
 
 
+@pytest.mark.slow
 def test_the_command_bakes_the_scene_that_it_was_copied_in(scene, tmp_path):
     scene.name = "Other"
     shots.walker(scene, frames=30)

@@ -207,6 +207,7 @@ def test_bad_input_exits_with_2_before_anything_is_baked(night, capfd, text, opt
     assert not (manifest.parent / "baked").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "options", "says"),
     [

@@ -43,6 +43,7 @@ def test_it_sets_up_bakes_saves_and_reports_by_itself(shot, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"shot.blend", "baked.blend", "report.json"}
 
 
+@pytest.mark.slow
 def test_the_bpy_module_runs_the_same_command(shot, tmp_path):
     report = tmp_path / "report.json"
     assert run(shot, "--report", report) == 0
@@ -183,6 +184,7 @@ def test_no_result_is_written_over_another_or_over_what_is_read(scene, tmp_path,
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_broken_or_missing_file_exits_with_2(tmp_path):
     broken = tmp_path / "broken.blend"
     broken.write_bytes(b"BLENDER-v405" + b"\x00" * 100)
@@ -205,6 +207,7 @@ def test_a_scene_without_or_with_several_armatures_exits_with_2(scene, tmp_path,
     assert "several armatures ('Walker', 'Walker.001')" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_interrupted_bake_exits_with_130_and_writes_nothing(scene, tmp_path):
     shots.walker(scene, frames=1500)
     path = tmp_path / "long.blend"
@@ -247,6 +250,7 @@ def test_progress_comes_in_the_asked_style(shot, capfd, style):
         assert lines[-1].endswith(" s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -282,6 +286,7 @@ def test_a_key_at_the_beginning_of_time_is_told_of(scene, tmp_path, capfd, monke
     assert "look for a key that lies far away" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pipes")
 @pytest.mark.parametrize("output", ["closed", "full"])
 def test_an_output_that_nobody_reads_stops_no_bake(shot, tmp_path, output):

@@ -41,6 +41,7 @@ def test_a_cover_is_the_ground_and_is_printed_no_deeper_than_it_is_thick(platfor
     assert not [finding for finding in result.report["warnings"] if "Hard Ground" in finding]
 
 
+@pytest.mark.slow
 def test_what_is_covered_is_hard_ground_and_bears_beside_the_cover(platform):
     options, box = platform.softground, bpy.context.object
     options.painted.layer_depth = "Mine"  # of another ground

@@ -210,6 +210,7 @@ def picture(scene, frame, path):
     return pixels
 
 
+@pytest.mark.slow
 def test_a_look_goes_along_with_the_ground_and_is_gone_with_the_bake(short_walk, tmp_path):
     ship = deck(short_walk, keyed=rolling)
     ground, before = short_walk.softground.ground, set(short_walk.softground.ground.data.keys())
@@ -337,6 +338,7 @@ def props_on(scene, keyed):
     return {name: (step["max_depth_m"], step["compressed_m3"], step["peak_force_n"]) for name, step in steps.items()}
 
 
+@pytest.mark.slow
 def test_props_on_a_deck_that_sails_press_as_on_still_ground_and_weigh_more_on_a_lift(scene):
     before = props_on(scene, ())
     assert before.keys() == {"Ball", "Crate"}

@@ -98,6 +98,7 @@ def test_rolling_pressure_changes_the_prints_and_all_options_bake_within_the_che
     assert 0 < everything["totals"]["max_depth_m"] < rolling["totals"]["max_depth_m"]
 
 
+@pytest.mark.slow
 def test_each_side_of_a_painted_border_is_as_if_all_ground_were_like_it(walk):
     ground = walk.softground.ground = plane(walk, vertices=300)
     modulus = walk.softground.material.youngs_modulus
@@ -149,6 +150,7 @@ def test_a_painted_rim_passes_the_check_of_volumes(walk):
     assert 0 <= totals["rim_m3"] <= totals["compressed_m3"]
 
 
+@pytest.mark.slow
 def test_paint_is_seen_through_modifiers(walk):
     ground = walk.softground.ground = plane(walk)
     paint(ground, "softground_layer_depth", np.zeros(len(ground.data.vertices)))

@@ -94,6 +94,7 @@ def bytes_of(footprints):
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [pytest.param(0.1, marks=SLOW), 0.2, pytest.param(0.5, marks=SLOW)])
 def test_a_crate_that_is_not_listed_is_named_and_nothing_prints_below_it(opened_as, height):
     scene = opened_as(over_a_crate, height)
@@ -132,6 +133,7 @@ def test_the_warning_has_a_button_that_adds_the_crate_and_the_bake_notices_when_
     assert bake_report.stale_reasons(scene) == ("The mesh or the position of 'Box', which is hard ground, has changed",)
 
 
+@pytest.mark.slow
 def test_what_is_out_of_reach_changes_nothing_bit_for_bit(walk):
     scene = bpy.context.scene
     scene.softground.ground, scene.softground.cell_size = plane(scene, size=9.0, vertices=200), 0.02

@@ -98,6 +98,7 @@ def test_a_made_ground_with_a_bake_on_it_and_a_mesh_of_the_users_stay(short_walk
     assert "Grid" in short_walk.objects
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made_by", ["bake", "create_ground"])
 def test_a_made_ground_is_fine_where_legs_plough(scene, made_by):
     test_carving.walker(scene, **test_carving.SHIN_DEEP)

@@ -16,6 +16,7 @@ from tests.blender.new_look_worker import RECORD
 ROOT = Path(__file__).parents[3]
 
 
+@pytest.mark.slow
 def test_a_look_added_by_one_record_is_baked_thrown_heard_weathered_and_exported(tmp_path):
     command = [sys.executable, "-m", "tests.blender.new_look_worker", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)

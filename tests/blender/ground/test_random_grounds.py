@@ -127,6 +127,7 @@ def session(chance, folder):
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "numbers",
     [

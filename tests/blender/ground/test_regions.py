@@ -81,6 +81,7 @@ def inside(step, stripe):
     return ends[stripe + 1] + 0.06 < y.min() and y.max() < ends[stripe] - 0.06
 
 
+@pytest.mark.slow
 def test_each_material_prints_as_its_preset_and_a_hard_one_not_at_all(four):
     choose()
     result = bake(four)
@@ -132,6 +133,7 @@ def test_one_preset_in_all_slots_is_as_without_bit_for_bit(four):
     assert after.report["totals"] == before.report["totals"]
 
 
+@pytest.mark.slow
 def test_a_bake_is_outdated_by_a_preset_or_a_face_that_is_of_another_material(four):
     bake(four)
     assert bake_report.stale_reasons(four) == ()
@@ -306,6 +308,7 @@ def test_what_the_record_says_is_read_back(four):
     assert made_with.regions == settings.snapshot(four).regions
 
 
+@pytest.mark.slow
 def test_crumbs_look_like_the_material_that_they_come_from(four):
     choose()
     four.softground.debris = True
@@ -343,6 +346,7 @@ def depths_of_layers(ground):
     return values[values > 0], places.reshape(-1, 3)[values > 0]
 
 
+@pytest.mark.slow
 def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, monkeypatch):
     ground = four.softground.ground
     bake(four)
@@ -414,6 +418,7 @@ def in_weathers(scene):
     return shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("halves", [("", "mud"), ("dry_sand", ground_slots.HARD)])
 def test_weather_acts_in_each_region_as_on_its_ground_alone(four, halves):
     choose(np.repeat(halves, 2).tolist())
@@ -445,6 +450,7 @@ def test_weather_acts_in_each_region_as_on_its_ground_alone(four, halves):
         assert np.array_equal(mixed[0, 200][far[1], 0], mixed[None, 200][far[1], 0]), "and does not melt"
 
 
+@pytest.mark.slow
 def test_wind_fills_prints_by_those_of_its_own_region(four):
     choose()
     result = bake(four)
@@ -465,6 +471,7 @@ def test_wind_fills_prints_by_those_of_its_own_region(four):
         assert filled == blown if stripe < 3 else deepest == 0.0
 
 
+@pytest.mark.slow
 def test_weather_of_one_region_is_one_group_and_goes_with_the_bake(four):
     bake(four)
     weather_by(four, Snowfall=2.0, Temperature=-4.0, Time_Scale=900.0)
@@ -502,6 +509,7 @@ def test_soles_carry_what_sticks_onto_a_hard_material(four):
     assert max(y) < BORDERS[2] + 0.01
 
 
+@pytest.mark.slow
 def test_the_command_line_bakes_what_it_and_the_file_say(four, tmp_path):
     choose()
     expected = [(row["id"], row["surface"], row["compressed_m3"]) for row in bake(four).report["steps"]]
@@ -516,6 +524,7 @@ def test_the_command_line_bakes_what_it_and_the_file_say(four, tmp_path):
     assert [(row["id"], row["surface"], row["compressed_m3"]) for row in steps] == expected
 
 
+@pytest.mark.slow
 def test_live_footprints_are_those_of_the_bake(four):
     choose()
     four.frame_set(four.softground.frame_start)

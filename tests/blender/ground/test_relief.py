@@ -35,6 +35,7 @@ def baked(addon):
     return values
 
 
+@pytest.mark.slow
 def test_what_is_computed_is_the_same_with_it_and_what_is_shown_is_not(baked):
     (raw, shown, steps, _, _), (raw_with, shown_with, steps_with, _, _) = baked["OFF"], baked["FINE"]
     assert np.array_equal(raw, raw_with)

@@ -5,6 +5,7 @@ import json
 import bmesh
 import bpy
 import numpy as np
+import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
@@ -69,6 +70,7 @@ def test_it_is_in_colour_in_renders_too(scene):
         assert len(set(material.diffuse_color[:3])) == 3
 
 
+@pytest.mark.slow
 def test_its_camera_sees_the_last_prints_in_a_low_sun(scene):
     bpy.ops.softground.add_sample_scene()
     (sun,) = [obj for obj in scene.objects if obj.type == "LIGHT"]

@@ -88,6 +88,7 @@ def test_each_step_prints_on_the_ground_under_it(crate):
     assert DECK - z[within].min() == pytest.approx(max(step.max_depth_m for step in prints_on(crate)), abs=0.005)
 
 
+@pytest.mark.slow
 def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
     scene = bpy.context.scene
     item, floor = also(crate), scene.softground.ground
@@ -119,6 +120,7 @@ def test_depth_on_each_ground_is_as_on_that_ground_alone(crate):
             assert step.rim_m3 == pytest.approx(same.rim_m3, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_further_ground_that_nobody_walks_on_changes_nothing_bit_for_bit(walk):
     scene = bpy.context.scene
     scene.softground.ground, scene.softground.cell_size = plane(scene, size=9.0, vertices=200), 0.02
@@ -134,6 +136,7 @@ def test_a_further_ground_that_nobody_walks_on_changes_nothing_bit_for_bit(walk)
     assert not baked_ground.is_baked(aside)
 
 
+@pytest.mark.slow
 def test_walkers_below_a_bridge_are_not_on_it_whichever_ground_is_the_first(walk):
     scene = bpy.context.scene
     floor = scene.softground.ground = plane(scene, size=9.0, vertices=200)
@@ -186,6 +189,7 @@ def test_each_step_up_the_stairs_is_on_the_stair_under_it(opened_as):
     assert all(abs(row["position"][2] - STAIRS[row["ground"]]) < 1e-3 for row in result.report["steps"])
 
 
+@pytest.mark.slow
 def test_clear_gives_all_grounds_back_by_bytes_or_the_one_that_is_shown(crate):
     scene = bpy.context.scene
     before = fingerprints.of_file()
@@ -216,6 +220,7 @@ def test_the_depth_is_predicted_on_all_of_them(crate):
     assert predicted == pytest.approx(bake(scene).report["totals"]["typical_depth_m"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_depth_is_predicted_on_the_ground_that_is_shown_in_what_that_is_made_of(crate):
     scene, options = bpy.context.scene, bpy.context.scene.softground
     item, slab = also(crate), box(scene, "Slab", 0.1, y=(3.0, 4.0))
@@ -260,6 +265,7 @@ def test_each_ground_goes_with_its_prints_into_another_file(crate, tmp_path):
     assert bytes_of(prints_on(bpy.data.objects[CRATE])) == prints
 
 
+@pytest.mark.slow
 def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(crate):
     scene = bpy.context.scene
     item = also(crate)
@@ -289,6 +295,7 @@ def test_steps_are_edited_as_well_once_another_ground_was_listed(crate):
     assert not baked_ground.is_baked(crate)
 
 
+@pytest.mark.slow
 def test_what_makes_one_ground_outdated_is_said_of_each(crate):
     scene = bpy.context.scene
     item = also(crate)
@@ -367,6 +374,7 @@ def shown_on(*grounds):
     return [as_rendered(baked_ground.display_mesh_of(ground))[:, 2] for ground in grounds]
 
 
+@pytest.mark.slow
 def test_live_mode_presses_all_grounds_as_a_bake_does_and_takes_back_what_it_pressed(crate):
     scene = bpy.context.scene
     item, floor = also(crate), scene.softground.ground
@@ -429,6 +437,7 @@ def test_live_mode_presses_a_ground_again_when_its_material_changes_and_leaves_t
     assert not baked_ground.has_remains(crate)
 
 
+@pytest.mark.slow
 def test_live_mode_says_why_it_does_not_follow_where_steps_come_onto_another_ground(crate):
     scene = bpy.context.scene
     slab = box(scene, "Slab", 0.05, y=(3.0, 4.0))
@@ -468,6 +477,7 @@ def all_answered():
         live.answer(0.0)
 
 
+@pytest.mark.slow
 def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_again(crate):
     scene = bpy.context.scene
     floor, slab = scene.softground.ground, in_live_mode_over_a_slab(crate)
@@ -490,6 +500,7 @@ def test_live_mode_knows_its_grounds_when_one_is_taken_off_the_list_and_listed_a
     assert len(below(prints_on(crate))) == len(prints_on(crate)) >= 2
 
 
+@pytest.mark.slow
 def test_live_mode_goes_on_when_another_of_its_grounds_is_shown_and_says_why_not_where_one_is_replaced(crate):
     options = bpy.context.scene.softground
     floor, slab = options.ground, in_live_mode_over_a_slab(crate)
@@ -590,6 +601,7 @@ def test_what_moves_or_is_no_ground_is_refused(crate):
     assert "'Crate' beside the ground moves" in refusal(bpy.ops.softground.bake)
 
 
+@pytest.mark.slow
 def test_the_command_line_names_several_grounds_each_with_its_preset(crate, tmp_path):
     path, report, receipt = tmp_path / "shot.blend", tmp_path / "report.json", tmp_path / "receipt.json"
     bpy.context.scene.softground.ground = None
@@ -646,6 +658,7 @@ def test_a_bake_that_is_closed_while_it_writes_leaves_all_grounds_as_they_were(c
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_a_ground_that_no_step_is_on_any_more_is_cleared(crate):
     scene = bpy.context.scene
     also(crate)
@@ -658,6 +671,7 @@ def test_a_ground_that_no_step_is_on_any_more_is_cleared(crate):
     assert not baked_ground.has_remains(crate)
 
 
+@pytest.mark.slow
 def test_weather_is_of_each_ground(crate):
     scene = bpy.context.scene
     item = also(crate)
@@ -674,6 +688,7 @@ def test_weather_is_of_each_ground(crate):
     assert weather_modifier.modifier_of(baked_ground.display_mesh_of(crate)) is not None
 
 
+@pytest.mark.slow
 def test_marks_and_hard_steps_beside_several_grounds_are_there_once(crate):
     scene = bpy.context.scene
     item, floor = also(crate), scene.softground.ground
@@ -755,6 +770,7 @@ def beside_a_far_field(crate):
     return scene
 
 
+@pytest.mark.slow
 def test_what_happens_on_hard_ground_is_with_the_first_ground_that_has_steps(crate):
     scene = beside_a_far_field(crate)
     options = scene.softground
@@ -778,6 +794,7 @@ def test_edits_that_have_lost_their_step_stay_beside_a_ground_without_steps(crat
     assert record_of(crate).edits == lost
 
 
+@pytest.mark.slow
 def test_weather_stays_on_a_ground_that_no_step_is_on_for_a_while(crate):
     scene = bpy.context.scene
     item = also(crate)
@@ -836,6 +853,7 @@ def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(cr
     assert bake(scene).report["warnings"] == []
 
 
+@pytest.mark.slow
 def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_cleared_or_it_is_listed(crate):
     scene = bpy.context.scene
     before, options = fingerprints.of_file(), scene.softground
@@ -859,6 +877,7 @@ def test_a_ground_that_leaves_the_list_with_its_prints_is_named_until_they_are_c
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_a_ground_that_others_alone_have_walked_on_is_no_finding_of_the_next_bake(crate):
     scene, options = bpy.context.scene, bpy.context.scene.softground
     bake(scene)
@@ -907,6 +926,7 @@ def test_a_printed_ground_that_is_deleted_is_forgotten_at_once_and_undo_brings_b
     assert [item.object.name for item in bpy.context.scene.softground.printed] == ["Field"]
 
 
+@pytest.mark.slow
 def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_no_sound(
     crate, tmp_path, monkeypatch, capfd
 ):
@@ -934,6 +954,7 @@ def test_a_ground_that_is_listed_again_with_an_older_bake_doubles_no_event_and_n
     assert bake_report.baked_grounds(options) == [crate, floor]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", ["bake", "live"])
 def test_the_later_bake_is_heard_whatever_grounds_are_called_by_then_and_whichever_is_listed_first(crate, again):
     scene = bpy.context.scene
@@ -979,6 +1000,7 @@ def heard_steps(scene, folder, monkeypatch):
     return sorted(step.frame for step in steps)
 
 
+@pytest.mark.slow
 def test_a_rig_that_was_renamed_between_two_bakes_is_heard_once(crate, tmp_path, monkeypatch):
     scene = bpy.context.scene
     options, floor = scene.softground, scene.softground.ground
@@ -1041,6 +1063,7 @@ def test_events_and_sound_are_of_the_steps_on_all_grounds_and_a_mesh_says_that_i
     assert messages == ["Wrote ground '{name}' alone: show another one in the Ground panel to write that too"]
 
 
+@pytest.mark.slow
 def test_a_bake_again_takes_the_prints_of_all_grounds_over_until_something_acts_on_them(crate):
     scene = bpy.context.scene
     item, options = also(crate), scene.softground

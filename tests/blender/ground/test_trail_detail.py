@@ -228,6 +228,7 @@ def test_the_surface_between_vertices_is_the_evaluated_one(scene):
     assert np.abs(in_target - in_source).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("and_then", ["", "DISPLACE", "ROUNDED"])
 def test_beside_the_trail_a_ground_is_subdivided_no_more_often_than_its_shape_needs(scene, and_then):
     ground = coarse_ground(scene)

@@ -52,6 +52,7 @@ def test_prints_carry_the_place_under_the_sole_and_the_depth_of_the_tread(ground
     assert np.ptp(inside[:, 0]) > 1.5 * np.ptp(inside[:, 1])
 
 
+@pytest.mark.slow
 def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scene):
     scene.softground.tread = 0.0
     bake(scene)
@@ -78,10 +79,12 @@ def prints_of_a_dog(scene):
     return footprints
 
 
+@pytest.mark.slow
 def test_a_dog_wears_no_shoes_whatever_the_bones_of_its_forelegs_are_called(prints_of_a_dog, scene):
     assert own_data.SOLE not in scene.softground.ground.data.attributes
 
 
+@pytest.mark.slow
 def test_prints_of_all_paws_head_where_their_toes_point(prints_of_a_dog):
     off = np.array([step.heading + np.pi / 2 for step in prints_of_a_dog])
     assert np.cos(off).min() > np.cos(np.radians(5.0))
@@ -127,6 +130,7 @@ def shown(scene):
     return heights(baked_ground.display_mesh_of(scene.softground.ground), "SoftGround Display")
 
 
+@pytest.mark.slow
 def test_an_image_is_pressed_and_the_same_bytes_again_and_another_is_not_the_same(shod):
     options = shod.softground
     options.tread_pattern, options.tread_image = "IMAGE", picture(CHECKER)
@@ -194,6 +198,7 @@ def test_images_are_set_by_name_on_the_command_line(shod):
         setting_paths.assign(shod.softground, "tread_image", "Another")
 
 
+@pytest.mark.slow
 def test_soles_press_the_grooves_of_their_own_mesh(shod):
     """The sample character's shoes have bars; from shoes without them nothing is taken, and the bake says so."""
     plain = shown(shod)

@@ -128,6 +128,7 @@ def trodden_twice(footprints, position, *rest, **known):
     return replace(places, again=again, blur_before=blur)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud", "wet_sand"]))
 def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface, twice, monkeypatch):
@@ -226,6 +227,7 @@ def table_of(scene, name=weather_table.TABLE):
     return inner.nodes, weather_table.named(inner, name).data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud", "wet_sand"]))
 def test_steady_weather_is_looked_up_and_as_it_would_be_worked_out(opened, surface, monkeypatch):
     scene = opened(surface)
@@ -247,6 +249,7 @@ def test_steady_weather_is_looked_up_and_as_it_would_be_worked_out(opened, surfa
             assert first == pytest.approx(other, abs=2e-6 * max(1.0, float(np.abs(other).max()))), values
 
 
+@pytest.mark.slow
 def test_the_table_of_steady_weather_counts_only_for_the_sliders_and_frames_that_it_is_for(opened, monkeypatch):
     scene = opened("sand")
     bpy.ops.softground.add_weather()
@@ -283,6 +286,7 @@ KEYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud"]))
 def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_add_on(opened, surface, tmp_path):
     scene = opened(surface)
@@ -341,6 +345,7 @@ def test_a_changed_and_a_removed_key_count_at_once(opened):
     assert positions(scene, 300)[:, 2].max() < 0.1 * steady[:, 2].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_keys", [False, True])
 def test_a_copy_of_the_ground_has_weather_of_its_own(opened, has_keys):
     scene = opened()
@@ -653,6 +658,7 @@ def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened
     assert not [group for group in bpy.data.node_groups if group.name.startswith(weather_inputs.GROUP)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("felt", [False, True])
 def test_a_bake_gives_its_weather_what_it_would_find_in_the_stored_record(opened, felt):
     scene = opened("sand")
@@ -748,6 +754,7 @@ def test_snow_that_cannot_lie_is_as_much_as_can_fall(opened, warm):
     assert 0.0 <= scene.softground.snow_cm < 500.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("detail", ["NEVER", "ALWAYS"])
 def test_keys_go_over_to_the_mesh_that_carries_the_next_bake(opened, detail):
     scene = opened()

@@ -104,6 +104,7 @@ def steps(scene):
     return [step.name for step in baked_steps.of(scene.softground.ground)]
 
 
+@pytest.mark.slow
 def test_each_button_that_changes_steps_works_in_a_window(scene, press, steps):
     session.choose_steps(steps[0])
     for name in EDITING:
@@ -133,6 +134,7 @@ def test_edits_that_change_nothing_touch_nothing(scene, press, steps):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatch, steps):
     before, undone = fingerprints.of_file(), 0
     monkeypatch.setattr(ModalJob, "execute", ModalJob._start)
@@ -151,6 +153,7 @@ def test_an_edit_that_is_left_in_any_state_has_changed_nothing(scene, monkeypatc
     assert fingerprints.of_file() != before
 
 
+@pytest.mark.slow
 def test_weather_comes_in_short_steps_and_not_at_all_where_they_are_left(scene, press, steps):
     before = fingerprints.of_file()
     for ticks in itertools.count(1, 3):
@@ -167,6 +170,7 @@ def test_weather_comes_in_short_steps_and_not_at_all_where_they_are_left(scene, 
     assert weather.values_of(scene.softground.ground)["Temperature"] == weather.PRESETS["THAW"][1]["Temperature"]
 
 
+@pytest.mark.slow
 def test_plants_give_way_in_short_steps_and_not_at_all_where_they_are_left(scene, monkeypatch, press, steps):
     before = fingerprints.of_file()
     for ticks in (1, 4):

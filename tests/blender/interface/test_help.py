@@ -51,6 +51,7 @@ def names_of_everything():
             yield from (f"bpy.types.{cls.__name__}.{name}".lower() for name in cls.__annotations__)
 
 
+@pytest.mark.slow
 def test_every_link_on_every_page_leads_somewhere(files, pages):
     for name, page in pages.items():
         assert len(page.targets) > 5

@@ -44,6 +44,7 @@ def test_no_cell_is_in_contact_with_one_sole_and_in_the_rim_of_another():
     assert pairs(rim) == {(-1, 0), (2, 0), (0, 1), (0, -1), (1, 1), (1, -1)}
 
 
+@pytest.mark.slow
 def test_live_mode_shows_the_cells_of_each_sole_that_touches_as_the_bake_does(scene):
     walker(scene, frames=60)
     bpy.ops.softground.add_character()

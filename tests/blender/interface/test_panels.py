@@ -118,6 +118,7 @@ def drawn(panel):
 CONTROLS = ("prop", "prop_search", "operator", "menu", "template_list", "operator_menu_enum")
 
 
+@pytest.mark.slow
 def test_what_panels_have_translated_is_in_the_catalogues(shot):
     asked = set()
     for step in (int, bpy.ops.softground.bake, bpy.ops.softground.add_weather):
@@ -145,6 +146,7 @@ def controls(*, place="UI"):
     return sum(call[0] in CONTROLS for cls in shown for call in drawn(cls)[0])
 
 
+@pytest.mark.slow
 def test_with_everything_open_the_sidebar_of_a_walking_figure_has_at_most_60_controls(shot):
     assert controls() <= 42
     bpy.ops.softground.bake()
@@ -303,6 +305,7 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
     assert shot.softground.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_depth_that_is_typed_is_that_of_a_bake(shot, capsys):
     options = shot.softground
     assert prediction.of(shot) is None
@@ -507,6 +510,7 @@ def test_a_preset_of_one_s_own_comes_back_as_it_was_saved(shot, user_folder):
         bpy.ops.softground.save_preset(name="Snow")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", ["Deep Snow!", "Deep Snow?", "DEEP_SNOW_", "deep snow"])
 def test_a_preset_takes_the_place_of_another_only_when_it_is_told_to(shot, user_folder, again):
     bpy.ops.softground.save_preset(name="Deep Snow!", source="first")
@@ -672,6 +676,7 @@ def test_a_depth_that_all_steps_share_is_told_once(typical, deepest, shown):
     assert labels(bake_result._result, summary) == [f"6 steps, {shown}"]
 
 
+@pytest.mark.slow
 def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     def buttons():
         layout = MagicMock()

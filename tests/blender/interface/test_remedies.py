@@ -61,6 +61,7 @@ def test_the_remedies_that_a_warning_names_are_in_it_and_in_the_panel(wrong):
     assert (drawn[NAMED[0]].text, drawn[NAMED[0]].character) == ("Walk Ahead", "Walker")
 
 
+@pytest.mark.slow
 def test_remedies_stay_in_the_panel_while_their_finding_stands(wrong):
     state = bpy.context.window_manager.softground
     state.stale = "The settings have changed"

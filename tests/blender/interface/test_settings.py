@@ -101,6 +101,7 @@ def change(owner, name, scene):
         setattr(owner, name, value + 1 if setting.type == "INT" else low + 0.37 * (high - low))
 
 
+@pytest.mark.slow
 def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot):
     changing, seen = set(), set()
     before = settings.snapshot(shot)
@@ -222,6 +223,7 @@ def other_settings(scene):
     options.characters[0].soles.clear()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [False, True])
 def test_a_bake_is_made_of_the_settings_that_it_began_with_and_says_so(scene, given):
     shots.walker(scene, frames=24)
@@ -279,6 +281,7 @@ def test_a_created_ground_is_what_the_camera_saw_as_the_bake_began(scene):
     assert np.ptp(across) >= 14.0
 
 
+@pytest.mark.slow
 def test_what_prints_in_a_bake_may_become_the_ground_of_the_next_one_meanwhile(scene):
     all_on(scene)
     scene.softground.tread_pattern = "BARE"

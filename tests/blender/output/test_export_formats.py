@@ -303,6 +303,7 @@ def test_the_bpy_module_writes_the_same_file(scene, tmp_path):
     assert alone.read_bytes() == within.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shot", slow_but_one(["missing.blend", "flat.blend"]))
 def test_the_bpy_module_names_a_shot_that_cannot_be_exported(addon, tmp_path, shot):
     bpy.ops.wm.read_factory_settings(use_empty=True)

@@ -231,6 +231,7 @@ def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_wri
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_final_mesh_of_a_hidden_ground_is_where_the_ground_is(scene, ground):
     display_mesh = baked_ground.display_mesh_of(ground)
     display_mesh.hide_viewport = True

@@ -80,6 +80,7 @@ def write(scene, folder, frame, resolution=SIDE):
     return {path.stem.split("_")[1]: read_image(path)[..., :3] for path in paths}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud"]))
 @pytest.mark.parametrize(("frame", "wind"), slow_but_one([(20, 8.0), (300, 0.0)]))  # which would have filled all prints
 def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame, wind):
@@ -101,6 +102,7 @@ def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame
             np.testing.assert_allclose(images[kind][..., number], values, rtol=1e-5, atol=2e-6, err_msg=kind)
 
 
+@pytest.mark.slow
 def test_images_of_a_ground_with_regions_have_the_weather_of_each(opened, tmp_path, monkeypatch):
     scene = opened("snow", **weathered_shots.SOME)
     monkeypatch.undo()  # each surface is what it is
@@ -130,6 +132,7 @@ def test_images_of_a_ground_with_regions_have_the_weather_of_each(opened, tmp_pa
     assert not water[inside & ~in_mud].any()
 
 
+@pytest.mark.slow
 def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):
     scene = opened("mud", **weathered_shots.SOME)
     (tmp_path / "own").mkdir()
@@ -165,6 +168,7 @@ def test_keyed_weather_and_remapped_time_are_those_of_the_scene(opened, tmp_path
     np.testing.assert_allclose(write(scene, tmp_path, 200)["displacement"][..., 0], height, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_hidden_weather_and_none_write_the_bake_alone(opened, tmp_path):
     scene = opened("snow", **weathered_shots.SOME)
     ground = scene.softground.ground
@@ -191,6 +195,7 @@ def test_an_export_leaves_nothing_behind(opened, tmp_path):
     assert len(list(tmp_path.glob("*_weather_*.exr"))) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [{"material": None}, {"time_stretch": 10**400}, {"frame_rate": 0.0}])
 def test_a_bake_whose_inputs_are_damaged_is_named(opened, tmp_path, monkeypatch, damage):
     scene = opened("snow", Snowfall=2.0)

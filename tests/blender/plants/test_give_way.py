@@ -139,6 +139,7 @@ def go_to(scene, frame):
     scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_chosen_roots_it_is_the_closed_form(shot, kind):
     place = roots()
@@ -399,6 +400,7 @@ def test_needles_that_no_sole_has_touched_stay_beside_those_that_are_sent_off(sh
         assert np.linalg.norm((now - was)[trodden, :2], axis=1).mean() > 0.04
 
 
+@pytest.mark.slow
 def test_pebbles_roll_as_far_in_a_scene_of_other_units(scene):
     scene.unit_settings.scale_length = 0.01
     scene.softground.ground = plane(scene, 600.0, 10)
@@ -461,6 +463,7 @@ def test_a_rim_covers_half_of_the_litter_that_it_rises_under(shot):
     assert 0.3 < covered.mean() < 0.7
 
 
+@pytest.mark.slow
 def test_a_table_and_a_group_of_an_earlier_version_are_renewed_as_the_file_opens(shot, tmp_path):
     grass = hair(roots())
     modifier = give_way(grass)
@@ -484,6 +487,7 @@ def test_a_table_and_a_group_of_an_earlier_version_are_renewed_as_the_file_opens
     assert trampling_table.is_current(scene.softground.ground)
 
 
+@pytest.mark.slow
 def test_nodes_that_the_user_edited_stay_when_a_file_of_an_earlier_version_opens(shot, tmp_path):
     mine, grass = hair(roots()), hair(roots())
     give_way(mine, grass)

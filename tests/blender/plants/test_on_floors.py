@@ -57,6 +57,7 @@ def under_soles(place):
     return near
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floor", [with_a_region, with_a_slab])
 def test_pebbles_on_a_hard_floor_roll_aside_and_blades_bend_under_the_soles(opened_as, floor):
     scene = opened_as(floor)
@@ -101,6 +102,7 @@ def over_a_deck(scene):
     bpy.context.view_layer.update()
 
 
+@pytest.mark.slow
 def test_who_walks_over_a_deck_bends_nothing_in_the_valley_below_it(opened_as):
     scene = opened_as(over_a_deck)
     grass = hair(on_the_floor(300) - (0.0, 0.0, 0.8))
@@ -111,6 +113,7 @@ def test_who_walks_over_a_deck_bends_nothing_in_the_valley_below_it(opened_as):
     assert not baked_ground.record_of(scene.softground.ground).on_floors
 
 
+@pytest.mark.slow
 def test_what_live_mode_keeps_has_the_steps_on_floors_as_well(opened_as):
     scene = opened_as(with_a_slab)
     place = on_the_floor(300)

@@ -106,6 +106,7 @@ def test_frames_play_in_any_order_with_sub_frames_and_wind_follows_its_keys(shot
     assert leans[4] == pytest.approx(90.0 * 0.6 * (1.0 - np.exp(-((10.0 / 15.0) ** 2))), rel=0.7)
 
 
+@pytest.mark.slow
 def test_what_lies_under_a_sole_does_not_sway_and_without_wind_all_is_as_before(shot):
     grass = hair(roots())
     give_way(grass)
@@ -168,6 +169,7 @@ np.save(sys.argv[2], flat)
 """
 
 
+@pytest.mark.slow
 def test_it_plays_without_the_add_on_and_without_scripts(shot, tmp_path):
     grass = hair(roots())
     give_way(grass)
@@ -182,6 +184,7 @@ def test_it_plays_without_the_add_on_and_without_scripts(shot, tmp_path):
     assert np.load(tmp_path / "played.npy").tobytes() == flat.tobytes()
 
 
+@pytest.mark.slow
 def test_snow_covers_what_is_low_and_lifts_nothing(shot):
     place = roots()
     leaves, grass = scattered(place), hair(place)
@@ -208,6 +211,7 @@ def on_the_ground(scatter):
     return scatter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["MEADOW", "LITTER"])
 def test_snow_lifts_no_scatter_that_follows_the_ground(shot, kind):
     scatter = on_the_ground(scattered(roots()))

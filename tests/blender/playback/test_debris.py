@@ -139,6 +139,7 @@ def wanted(obj, frame, wind=(0.0, 0.0, 0.0)):
     return np.array(sorted(map(tuple, place.tolist()))).reshape(-1, 3)
 
 
+@pytest.mark.slow
 def test_debris_flies_as_the_closed_form_says_in_any_order_of_frames(scene):
     (obj,) = [each for each in scene.objects if each.name.startswith("SoftGround Debris")]
     counts = []
@@ -178,6 +179,7 @@ def test_points_know_their_age_velocity_radius_kind_and_step(scene, frame):
         assert (wrong > 1e-3).mean() < 0.02, name  # a few lie in one place
 
 
+@pytest.mark.slow
 def test_wind_and_amount_act_at_once(scene):
     obj = debris_object.of(scene.softground.ground)
     modifier = obj.modifiers[0]
@@ -191,6 +193,7 @@ def test_wind_and_amount_act_at_once(scene):
     assert 0.15 < len(shown(obj)) / len(wanted(obj, 20)) < 0.35
 
 
+@pytest.mark.slow
 def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     ground = scene.softground.ground
     before = fingerprints.of_mesh(debris_object.of(ground).data)
@@ -202,6 +205,7 @@ def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     assert fingerprints.of_mesh(debris_object.of(ground).data) == before
 
 
+@pytest.mark.slow
 def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
     """Moved, deepened, scaled and shifted in time, muted, and a copy on an earlier print."""
     ground = scene.softground.ground
@@ -298,6 +302,7 @@ def test_a_run_in_dry_sand_throws_a_plume_at_each_landing(baked, scene):
     assert 0.08 < rise.max() < 0.4
 
 
+@pytest.mark.slow
 def test_debris_goes_with_the_ground_and_has_its_origin_so_that_no_line_runs_between_them(addon):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -386,6 +391,7 @@ def delete(obj):
     bpy.ops.object.delete()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_own_parent", [False, True])
 def test_another_bake_gives_debris_new_points_and_leaves_all_that_the_user_did_to_it(scene, has_own_parent):
     obj = debris_object.of(scene.softground.ground)
@@ -494,6 +500,7 @@ def test_undo_brings_debris_back_with_its_ground(scene):
     assert debris_object.of(scene.softground.ground).name in scene.objects
 
 
+@pytest.mark.slow
 def test_only_the_largest_have_a_shape_and_the_rest_are_round(scene):
     obj = debris_object.of(scene.softground.ground)
     scene.frame_set(24)
@@ -549,6 +556,7 @@ def arrays_of_points(text, name):
     return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in samples}
 
 
+@pytest.mark.slow
 def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     """All of the volume that has landed by a frame, around where it lies."""
     ground, side, resolution = scene.softground.ground, 8.0, 1024
@@ -620,6 +628,7 @@ def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
             assert speeds[frame].shape == place.shape
 
 
+@pytest.mark.slow
 def test_alembic_carries_debris_as_points_with_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()

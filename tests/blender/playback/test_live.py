@@ -178,6 +178,7 @@ def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
     assert marks.reshape(-1, 3)[:, 2].max() == pytest.approx(0.003, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_weather_acts_on_kept_prints_as_on_baked_ones_and_waits_for_them(live_shot):
     live_shot.frame_set(live_shot.softground.frame_end)
     with pytest.raises(RuntimeError, match="press Keep, then add weather"):
@@ -212,6 +213,7 @@ def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     assert summary == {key: pytest.approx(baked[key]) for key in summary}
 
 
+@pytest.mark.slow
 def test_kept_prints_throw_what_those_of_a_bake_throw(live_shot):
     live_shot.frame_set(live_shot.softground.frame_end)
     ground = live_shot.softground.ground
@@ -553,6 +555,7 @@ def steps_taken(job, most=10**6):
     return taken
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ground", slow_but_one(["coarse", "none", "fine"]))
 def test_esc_as_live_mode_starts_leaves_everything_as_it_was(coarse_shot, ground):
     if ground == "none":
@@ -580,6 +583,7 @@ def test_esc_as_live_mode_starts_leaves_everything_as_it_was(coarse_shot, ground
         assert not live.is_on()
 
 
+@pytest.mark.slow
 def test_esc_as_prints_are_kept_leaves_live_mode_on(coarse_shot):
     bpy.ops.softground.live()
     coarse_shot.frame_set(30)

@@ -110,6 +110,7 @@ def test_heights_are_those_of_the_record_in_any_order_and_between_frames(scene, 
         assert np.abs(moved[:, :2]).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape_keys", [True, False])
 @pytest.mark.usefixtures("share")
 def test_shading_attributes_follow_the_same_time(scene, footprints, shape_keys):

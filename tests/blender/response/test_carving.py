@@ -89,6 +89,7 @@ def in_the_ground(footprints, places, frame, cell=CELL):
     return np.min([rim - compression for compression, rim in around], axis=0) - z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("snow", "cell"),
     [
@@ -111,6 +112,7 @@ def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_a
     assert max(depths) <= cell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_size", [CELL, 0.02])
 def test_where_snow_ends_at_a_floor_walls_crumble_as_the_foot_leaves_and_the_bake_is_read_again(scene, cell_size):
     frames, end = 96, -1.0
@@ -145,6 +147,7 @@ def crawler(scene):
     return test_crawling.crawler(rigs.FAMILIES["mixamo"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mover", "snow"),
     [
@@ -175,6 +178,7 @@ def test_nor_of_who_runs_crawls_or_goes_on_four_legs(scene, skins, mover, snow):
     assert max(depths) <= CELL
 
 
+@pytest.mark.slow
 def test_what_a_body_drags_carves_the_snow(scene):
     armature = walker(scene, **DEEP)
     scene.frame_set(1)
@@ -199,6 +203,7 @@ def test_what_a_body_drags_carves_the_snow(scene):
     assert without[1][0] - without[0][0] > -0.01
 
 
+@pytest.mark.slow
 def test_between_two_holes_the_ground_is_5_cm_lower_than_the_snow(scene):
     walker(scene, frames=60, **SHIN_DEEP)
     _, record_of_bake = bake(scene)
@@ -225,6 +230,7 @@ def test_what_is_carved_follows_neither_from_the_cells_nor_from_the_frame_rate(a
     assert list(carved.values()) == pytest.approx([np.mean(list(carved.values()))] * len(carved), rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scene, skins):
     armature = walker(scene, **DEEP)
     report, record_of_bake = bake(scene)
@@ -259,6 +265,7 @@ def test_the_skin_that_is_carved_with_is_shown_and_all_that_it_cut_is_there(scen
         assert np.array_equal(again[number].tile(again[number].compression), carve.tile(carve.compression))
 
 
+@pytest.mark.slow
 def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
     armature = walker(scene)
     bpy.ops.softground.load_preset(name="Dry Sand")
@@ -283,6 +290,7 @@ def test_dry_sand_that_legs_have_left_is_nowhere_steeper_than_33_degrees(scene):
         assert np.degrees(np.arctan(slope[at_rest[first] & at_rest[other]].max())) < 33.0
 
 
+@pytest.mark.slow
 def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatch, tmp_path):
     monkeypatch.setattr(preset_files, "user_folder", lambda: tmp_path)
     walker(scene, **SHIN_DEEP)
@@ -306,6 +314,7 @@ def test_a_deep_region_is_carved_as_a_ground_that_is_all_of_it(scene, monkeypatc
         assert np.array_equal(carve.tile(carve.compression), whole.tile(whole.compression))
 
 
+@pytest.mark.slow
 def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     walker(scene, **DEEP)
     _, record_of_bake = bake(scene)
@@ -326,6 +335,7 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
 
 
+@pytest.mark.slow
 def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     walker(scene, **DEEP)
     scene.softground.ground_margin = 2.0

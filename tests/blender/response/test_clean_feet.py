@@ -112,6 +112,7 @@ def spoil(scene, slide=0.02, floats=0.03):
     scene.frame_set(scene.frame_current)
 
 
+@pytest.mark.slow
 def test_a_slide_and_a_float_that_were_added_are_gone(floor_walk):
     jobs.run(clean_feet(floor_walk))
     shot, touching = read(floor_walk)
@@ -128,6 +129,7 @@ def test_a_slide_and_a_float_that_were_added_are_gone(floor_walk):
     assert np.abs(cleaned_hips[:, 2] - hips[:, 2]).max() < 0.01, "the body is back at its height"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.8, 1.2])
 def test_a_walk_whose_travel_is_scaled_keeps_the_bars(floor_walk, part):
     """As of networks and retargets: each foot skates all the time that it stands."""
@@ -141,6 +143,7 @@ def test_a_walk_whose_travel_is_scaled_keeps_the_bars(floor_walk, part):
     check_bars(floor_walk, f"travel x {part}", before)
 
 
+@pytest.mark.slow
 def test_a_mesh_with_bumps_is_a_hard_floor_too(floor_walk):
     bumps = plane(floor_walk, height=lambda x, y: 0.05 * np.sin(3.0 * x) * np.sin(2.5 * y))
     floor_walk.softground.ground = bumps
@@ -149,6 +152,7 @@ def test_a_mesh_with_bumps_is_a_hard_floor_too(floor_walk):
     check_bars(floor_walk, "bumps", before)
 
 
+@pytest.mark.slow
 def test_the_panel_lists_no_gap_that_the_summary_does_not_know(floor_walk):
     spoil(floor_walk)
     cleaned = jobs.run(clean_feet(floor_walk))
@@ -234,6 +238,7 @@ def test_reference_motions_keep_the_bars(scene, name):
     check_bars(scene, name, before)
 
 
+@pytest.mark.slow
 def test_knees_keep_the_pace_of_a_fast_run_whose_feet_are_stopped(scene):
     """On a treadmill at 4 m/s: what slows one knee makes another too fast, many times over."""
     shots.import_file(shots.MotionFile("gait/hamner04_run400.bvh", 0.01, "-Z", "Y"))
@@ -283,6 +288,7 @@ def test_a_contact_without_strength_is_left_as_it_was_animated(floor_walk):
     assert np.abs(after.transforms[during] - before.transforms[during]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_foot_lock_leaves_a_bake_as_it_is(floor_walk):
     now = settings.snapshot(floor_walk)
     lock_contact(floor_walk, "BALL")

@@ -74,6 +74,7 @@ def fallen(scene, frame):
     return 3e-2 / 3600 * 21_600 * (frame - scene.softground.frame_start) / 24
 
 
+@pytest.mark.slow
 def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     opened.softground.steps_feel_weather = opened.softground.debris = True
     set_to(opened, **SNOWFALL)
@@ -97,6 +98,7 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
 
+@pytest.mark.slow
 def test_without_weather_steps_that_feel_it_leave_the_same_bits(opened):
     before = footprints(opened)
     opened.softground.steps_feel_weather = True
@@ -108,6 +110,7 @@ def test_without_weather_steps_that_feel_it_leave_the_same_bits(opened):
     assert same(footprints(opened), before)
 
 
+@pytest.mark.slow
 def test_steps_stand_on_the_snow_that_has_fallen(opened):
     set_to(opened, **SNOWFALL)
     before = footprints(opened)
@@ -140,6 +143,7 @@ def test_steps_stand_on_the_snow_that_has_fallen(opened):
     assert compression[far < 0.15].max() == pytest.approx(last.max_depth_m, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_slider_that_moves_makes_such_a_bake_outdated_and_no_other(opened):
     bpy.ops.softground.bake()
     set_to(opened, **SNOWFALL)
@@ -162,6 +166,7 @@ def keyed(scene, name, *keys):
     weather_keys.follow(modifier.id_data)
 
 
+@pytest.mark.slow
 def test_keyed_weather_is_felt_as_it_is_at_the_time_of_each_step(opened):
     before = footprints(opened)
     set_to(opened, **SNOWFALL)
@@ -195,6 +200,7 @@ def test_an_edit_presses_again_in_the_weather_of_the_bake(opened):
     assert recompose([footprint]).read(footprint.window)[0].min() < -0.1
 
 
+@pytest.mark.slow
 def test_feet_stand_on_the_weathered_ground(opened):
     options, height = opened.softground, {}
     options.sink_feet = True

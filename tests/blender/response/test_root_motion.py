@@ -82,6 +82,7 @@ def test_it_travels_the_way_that_the_walk_went(scene, treadmill):
     assert way[-1] @ (0, -1, 0) > 0.999 * np.linalg.norm(way[-1]), "the walker looks along -Y"
 
 
+@pytest.mark.slow
 def test_it_holds_beyond_the_frame_range(scene, treadmill):
     scene.softground.frame_start, scene.softground.frame_end = 12, 60
     bpy.ops.softground.root_motion()
@@ -89,6 +90,7 @@ def test_it_holds_beyond_the_frame_range(scene, treadmill):
     assert np.linalg.norm(hips[1] - hips[0]) < 0.02, "no jump back"
 
 
+@pytest.mark.slow
 def test_remove_gives_the_bytes_back_also_under_a_response(scene, treadmill):
     before = fingerprints.of_file()
     bpy.ops.softground.root_motion()

@@ -23,6 +23,7 @@ def ploughed(scene):
     return radius[kind == ThrowKind.PLOUGH], step[kind == ThrowKind.PLOUGH]
 
 
+@pytest.mark.slow
 def test_what_ploughs_through_powder_throws_some_of_it_which_does_not_lie_there_then(scene):
     armature = walker(scene, **DEEP)
     without, still = bake(scene)
@@ -53,6 +54,7 @@ def test_what_ploughs_through_powder_throws_some_of_it_which_does_not_lie_there_
         assert np.array_equal(again.laid_carves[number].tile(carve.rim), carve.tile(carve.rim))
 
 
+@pytest.mark.slow
 def test_it_flies_from_the_surface_ahead_of_the_leg_as_that_passes(scene):
     walker(scene, **DEEP)
     scene.softground.debris = True
@@ -69,6 +71,7 @@ def test_it_flies_from_the_surface_ahead_of_the_leg_as_that_passes(scene):
         assert (velocities[weight > 0][..., 1] < 0).all() or (velocities[weight > 0][..., 1] > 0).all()
 
 
+@pytest.mark.slow
 def test_it_goes_with_its_step_and_comes_back(scene):
     walker(scene, **DEEP)
     scene.softground.debris = True

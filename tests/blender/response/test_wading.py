@@ -33,6 +33,7 @@ def straightest_knees(scene, steps):
     return np.array(heights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("depth", "youngs_modulus", "bounce", "flexion"),
     [
@@ -90,6 +91,7 @@ def test_as_animated_gives_back_the_strength_of_tilt_from_before_wading(scene):
     assert not options.tilt.is_property_set("strength")
 
 
+@pytest.mark.slow
 def test_the_preset_wading_acts_with_arms_trunk_and_speed_and_can_be_taken_back(scene):
     shots.walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()

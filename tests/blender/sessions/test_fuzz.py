@@ -390,6 +390,7 @@ def felt(addon, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 @counts(1000, quick=10)
 @pytest.mark.timeout(3600)
 def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
@@ -444,6 +445,7 @@ def bomb(stored, method):
     return buffer.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("announced", [None, 1000])
 def test_an_unused_part_that_unpacks_to_a_gigabyte_takes_no_memory(stored, announced):
     content, size = bomb(stored, zipfile.ZIP_DEFLATED), struct.pack("<I", 2**30)
@@ -459,6 +461,7 @@ def test_an_unused_part_that_unpacks_to_a_gigabyte_takes_no_memory(stored, annou
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["contact_cells.npy", "record.json"])
 def test_a_part_that_unpacks_to_far_more_than_a_record_has_takes_no_memory(stored, name):
     content = rezipped(stored, name, bytes(2**28), zipfile.ZIP_DEFLATED)
@@ -511,6 +514,7 @@ PROPERTY_VALUES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @counts(5000)
 @pytest.mark.timeout(3600)
 def test_no_stored_property_makes_a_traceback(count, forgeable):
@@ -630,6 +634,7 @@ VALUES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @counts(500)
 @pytest.mark.timeout(3600)
 def test_no_command_line_makes_a_traceback_or_changes_the_shot(count, addon, tmp_path, monkeypatch, capfd):

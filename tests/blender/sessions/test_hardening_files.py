@@ -209,6 +209,7 @@ def test_a_signal_ends_a_bake_cleanly_at_any_moment(scene, tmp_path, number):
     assert [path.name for path in shot.parent.iterdir()] == ["shot.blend"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", slow_but_one([0.0, 0.1, 0.5, 0.9, 0.99]))
 def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
     broken = tmp_path / "broken.blend"
@@ -223,6 +224,7 @@ def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
 NAMES = ['it\'s "two"\nlines  ❄', "%s{0}$HOME`x` #####", "-rf", "--save", "ä" * 70, ".dot"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but_one(NAMES))
 def test_a_hostile_file_name_is_only_a_name(shot, name, tmp_path, capfd):
     folder = tmp_path / name
@@ -239,6 +241,7 @@ def test_a_hostile_file_name_is_only_a_name(shot, name, tmp_path, capfd):
     assert "1 done" in capfd.readouterr().out
 
 
+@pytest.mark.slow
 @posix
 def test_a_bake_that_is_paused_goes_on_where_it_stopped(shot, tmp_path):
     report = tmp_path / "report.json"

@@ -42,6 +42,7 @@ def curves_of(armature):
     return list(action_curves(armature.animation_data.action))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e30])
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_keys_that_are_no_places_are_refused_before_they_are_computed_with(walker, capfd, value):
@@ -306,6 +307,7 @@ def fifty(first, *marks):
     return pytest.param(range(first, first + 50), marks=[*marks, pytest.mark.timeout(3600)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "numbers",
     [

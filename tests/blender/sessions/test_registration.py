@@ -100,6 +100,7 @@ softground_addon.unregister()
 """
 
 
+@pytest.mark.slow
 def test_a_module_that_fails_at_first_use_says_so_each_time_and_runs_once_it_can(tmp_path):
     program = tmp_path / "failing.py"
     program.write_text(FAILING)
@@ -109,6 +110,7 @@ def test_a_module_that_fails_at_first_use_says_so_each_time_and_runs_once_it_can
     assert [line.count("pressed_shot") for line in finished.stdout.splitlines()] == [1, 1]
 
 
+@pytest.mark.slow
 def test_enabling_runs_no_module_that_bakes_nor_does_anything_without_a_ground(tmp_path):
     program = tmp_path / "enabled.py"
     program.write_text(ENABLED)

@@ -51,6 +51,7 @@ def stored(ground):
     return bytes(baked_ground.stored_record(ground))
 
 
+@pytest.mark.slow
 def test_edits_from_a_file_are_in_the_ground_the_report_and_the_next_bake(shot):
     folder, plain = shot
     first, two, three = (step["id"] for step in plain["steps"][1:4])
@@ -185,6 +186,7 @@ def shot_with(folder, name, change):
     return bake_it
 
 
+@pytest.mark.slow
 def test_a_step_takes_the_sole_of_a_mesh_and_keeps_it_without_the_mesh(shot):
     folder, plain = shot
     name = plain["steps"][2]["id"]

@@ -37,6 +37,7 @@ def contact_bones(scene, armature, steps):
     return np.array(gaps)
 
 
+@pytest.mark.slow
 def test_the_rig_stands_in_its_moved_print_and_in_all_others_as_before(rig):
     scene = bpy.context.scene
     set_up(rig)
@@ -70,6 +71,7 @@ def test_edits_that_are_reset_give_the_walk_back(scene):
     np.testing.assert_array_equal(contact_bones(scene, armature, steps), before)
 
 
+@pytest.mark.slow
 def test_a_step_beyond_the_leg_is_said(scene):
     armature = shots.walker(scene)
     set_up(armature)

@@ -121,6 +121,7 @@ def add_strip(scene):
 ANY_SETTING = (change_setting, change_mass, remap_time, halve_gravity, change_unit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -143,6 +144,7 @@ def test_every_change_of_the_inputs_makes_it_stale_until_the_next_bake(baked, ch
         assert bake_report.stale_reasons(baked) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [remap_time, halve_gravity, change_unit])
 def test_what_was_read_at_another_time_scale_gravity_or_unit_is_not_known(scene, change):
     shots.walker(scene, frames=40)

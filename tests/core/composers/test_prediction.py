@@ -64,6 +64,7 @@ def pressed(loads, material, pressure, variation=None):
     return max((print_.max_depth_m for print_ in prints_of(loads, material, pressure, variation)), default=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
 @pytest.mark.parametrize("painted", [False, True], ids=["even", "painted"])
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())

@@ -52,6 +52,7 @@ def test_a_foot_that_hangs_from_a_shin_is_no_shank():
     assert leg_soles(replace(motion, joints=joints)) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slide", "turn"), slow_but_one([(0.02, 0.1), (0.0, 0.0), (0.03, 0.0)]))
 def test_their_feet_stand_without_slide_or_gap_and_their_parts_stay_whole(slide, turn):
     motion, touching = blocks(slide, turn)
