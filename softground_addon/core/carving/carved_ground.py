@@ -128,7 +128,7 @@ class CarvedGround:
         self._across = 2 if 2 * cell_size * CELLS_ALONG_SOLE <= min(soles, default=0.0) else 1
         """Cells of the ground along a cell."""
         cell_size *= self._across
-        self._ground, self._cell_size = ground, cell_size
+        self._ground, self.cell_size = ground, cell_size
         self._coming = sorted(steps, key=lambda step: step.begins, reverse=True)
         self._pressing: list[CarvedStep] = []
         """Steps whose prints are changing."""
@@ -154,7 +154,7 @@ class CarvedGround:
         """What a tile is before anybody comes, from its cell centres."""
         window = self._tile_at(x, y)
         surface = self._undisturbed.surface(window)
-        terrain, depth = np.nan_to_num(surface.heights), self._ground.layer_depths(window, self._cell_size)
+        terrain, depth = np.nan_to_num(surface.heights), self._ground.layer_depths(window, self.cell_size)
         bottom = terrain - depth * (self._variation.factors(window).depth if self._variation else 1.0)
         return np.stack([terrain, surface.bears, bottom])
 
@@ -170,7 +170,7 @@ class CarvedGround:
 
     def _tile_at(self, x: Array, y: Array) -> Window:
         """The cells of a tile, from their centres."""
-        return Window(floor(x[0, 0] / self._cell_size), floor(y[0, 0] / self._cell_size), TILE, TILE)
+        return Window(floor(x[0, 0] / self.cell_size), floor(y[0, 0] / self.cell_size), TILE, TILE)
 
     def press(self, since: float, frame: float) -> None:
         """Go on to the ground as soles have pressed it by a frame; what is loose under them is packed."""
@@ -197,7 +197,7 @@ class CarvedGround:
 
         What is in the ground is drawn all the way, what only hovers over it at the end.
         """
-        moves, cell_size = around.take(part.vertices, axis=2), self._cell_size
+        moves, cell_size = around.take(part.vertices, axis=2), self.cell_size
         if not part.step.is_deep or not np.isfinite(moves).all():
             return None
         lowest = moves[1:3, 2].min(axis=0)
@@ -224,13 +224,13 @@ class CarvedGround:
     def _box(self, places: Array) -> Window:
         """The cells around places (3, ...)."""
         low, high = (np.array([end(along) for along in places[:2]]) for end in (np.min, np.max))
-        return Window.around(low, high, self._cell_size)
+        return Window.around(low, high, self.cell_size)
 
     def carve(self, part: Drawn, bodies: Sequence[Drawn], frame: float) -> None:
         """Cut the ground to one of the parts of bodies that are drawn."""
         step, walls = part.step, part.step.walls
         under = part.underside.min(axis=0)
-        least = least_cut(self._contact(part.window), self._cell_size / self._across)
+        least = least_cut(self._contact(part.window), self.cell_size / self._across)
         deep = self._tops.read(part.window)[0] - under >= least
         if (cut := part.window.around_cells(deep)) is None:
             return
@@ -255,12 +255,12 @@ class CarvedGround:
         if not holds or np.hypot(*velocity[:2]) < PLOUGHS_FROM or not depth.any():
             return
         row, column = np.nonzero(depth)
-        x, y = (centres[cells] for centres, cells in zip(window.centres(self._cell_size), (column, row), strict=True))
+        x, y = (centres[cells] for centres, cells in zip(window.centres(self.cell_size), (column, row), strict=True))
         ahead = np.argsort(x * part.way[0] + y * part.way[1])
         front = ahead[np.linspace(len(ahead) // 2, len(ahead) - 1, FRONT).astype(int)]
         top = np.full(FRONT, standing[row, column].mean())
         points = np.stack([x[front], y[front], top], axis=-1)
-        part.step.plough(frame, float(depth.sum()) * self._cell_size**2, points, velocity)
+        part.step.plough(frame, float(depth.sum()) * self.cell_size**2, points, velocity)
 
     def slide(self, bodies: Sequence[Drawn], frame: float) -> None:
         """Let slide what was loosened since it slid before, once it is time to."""
@@ -277,7 +277,7 @@ class CarvedGround:
         regions = self._ground.regions
         if regions is None:
             return step.walls.crumbling
-        numbers, shares = regions.under(window, window, self._cell_size)
+        numbers, shares = regions.under(window, window, self.cell_size)
         depths = np.array([find(regions.kinds[number].surface).wall_crumbling for number in numbers])
         return float(depths[0]) if shares is None else np.asarray(np.tensordot(depths, shares, 1))
 
@@ -301,18 +301,18 @@ class CarvedGround:
         """Let walls crumble at first, and what is loose slide on around bodies; at the end, all of it is recorded."""
         for step, frames in list(self._settling.items()):
             holds, begins = step.walls.strength > 0, frames == self._frames_to_rest
-            edge = ceil(2 * EDGE / self._cell_size)
+            edge = ceil(2 * EDGE / self.cell_size)
             sweeps = SWEEPS_TO_SETTLE if holds else SWEEPS_TO_REST
             window = self._of_recorder(step)
             most = np.max(self._crumbling(step, window.expanded(edge))) if begins else 0.0
             cells, _ = self._read(window)
             changed = np.where(cells.closed, 0.0, cells.surface - cells.terrain)
-            reach = step.walls.reach(changed, cells.loose + most, self._cell_size)
+            reach = step.walls.reach(changed, cells.loose + most, self.cell_size)
             window = window.expanded(max(reach, edge if most else 0, self._margin))
             cells, channels = self._read(window)
             held = self._held(bodies, window, cells)
             if most:
-                deepest = pieces(window, self._cell_size, self._crumbling(step, window))
+                deepest = pieces(window, self.cell_size, self._crumbling(step, window))
                 cells.crumble(deepest, held, self._bottom(window))
             if not holds and begins:
                 cells.gather(channels[-2 - SAMPLES**2] * QUANTUM, THIN)  # then its edges slide as well
@@ -338,7 +338,7 @@ class CarvedGround:
 
     def footprint(self, step: CarvedStep) -> Footprint:
         """What a step has carved."""
-        footprint, area = step.footprint, self._cell_size**2
+        footprint, area = step.footprint, self.cell_size**2
         frames = step.recorder.frames
         return step.recorder.footprint(
             character=footprint.character,
@@ -375,7 +375,7 @@ class CarvedGround:
         count, contact = self._across**2, self._contact(window)
         pressed = channels[:count] if count > 1 else channels[0]
         lowest, loose, broken = channels[-(SAMPLES**2) :], channels[count], channels[-1 - SAMPLES**2]
-        return CarvedCells(self._cell_size, terrain, bears == 0, contact, pressed, lowest, loose, broken), channels
+        return CarvedCells(self.cell_size, terrain, bears == 0, contact, pressed, lowest, loose, broken), channels
 
     def _write(
         self, step: CarvedStep, window: Window, cells: CarvedCells, channels: Array, frame: float, least: int = LEAST

@@ -30,7 +30,7 @@ from ..record.throws import Throw
 from .carved_ground import CarvedGround, Part, numbered
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
-from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides
+from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides, thinned
 
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
@@ -114,7 +114,7 @@ def carves_of(
     }
     carving = CarvedGround(ground, first.cell_size, list(steps.values()), skins[0][2].frame_rate)
     taken = [step for number, step in steps.items() if number < count]
-    bodies = [_Body(name, soles, skin, taken, bare(ground.terrain)) for name, soles, skin in skins]
+    bodies = [_Body(name, soles, skin, taken, bare(ground.terrain), carving.cell_size) for name, soles, skin in skins]
     for number, (since, frame) in enumerate(pairwise([-np.inf, *frames.tolist()])):
         carving.press(since, frame)
         drawn = []
@@ -165,19 +165,26 @@ class _Body:
     """A character's skin, part by part, and the steps that these parts take."""
 
     def __init__(
-        self, name: str, soles: Sequence[str], skin: RespondedSkin, steps: Sequence[CarvedStep], terrain: Terrain
+        self,
+        name: str,
+        soles: Sequence[str],
+        skin: RespondedSkin,
+        steps: Sequence[CarvedStep],
+        terrain: Terrain,
+        cell_size: float,
     ) -> None:
         of_body = [step for step in steps if step.footprint.character == name]
         self._parts = []
         self._away: list[int] = []
         """Frame from which the sole of each part is away from its last step."""
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
-        every = list(skin.triangles.values())
-        outward = np.split(outsides(places, np.concatenate(every)), np.cumsum([len(each) for each in every])[:-1])
+        every = thinned(places, skin.triangles, skin.bones, cell_size)
+        lengths = np.cumsum([len(triangles) for triangles in every.values()])
+        outward = np.split(outsides(places, np.concatenate(list(every.values()))), lengths[:-1])
         near = skin.near(terrain, NEAR)
-        used = numbered(np.concatenate([each[near[each].any(axis=1)] for each in every]).T, len(near))[0]
+        used = numbered(np.concatenate([each[near[each].any(axis=1)] for each in every.values()]).T, len(near))[0]
         self.poses = _poses(skin, used)
-        for (sole, triangles), sides in zip(skin.triangles.items(), outward, strict=True):
+        for (sole, triangles), sides in zip(every.items(), outward, strict=True):
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             is_near = near[triangles].any(axis=1)

@@ -102,6 +102,11 @@ class RespondedSkin:
         recording = self._recording.of(samples)
         return skinned(self._worn.skin, self._worn.bones, recording, chosen).astype(float)
 
+    @property
+    def bones(self) -> Indices:
+        """The bone that moves each vertex most, (V,)."""
+        return self._worn.skin.part
+
     def near(self, terrain: Terrain, distance: float) -> Mask:
         """Vertices (V,) of bones that come within a distance of a terrain [m], and of shapes or no bones.
 
@@ -123,6 +128,31 @@ class RespondedSkin:
         for shape in skin.shapes:
             near[shape.vertices] = True
         return near
+
+
+def thinned(points: Array, parts: Mapping[int, Indices], bones: Indices, size: float) -> dict[int, Indices]:
+    """Triangles (T, 3) of parts between fewer vertices: of each bone, the outermost in a cube of a size.
+
+    Those that are left between fewer than three vertices are gone. No vertex is moved by more than the cube's diagonal.
+
+    Parameters
+    ----------
+    points : (V, 3) float array
+        In one pose [m].
+    bones : (V,) int array
+        The bone that each vertex goes with.
+    """
+    cubes = np.floor(points / size).astype(np.int64)
+    cubes -= cubes.min(axis=0)
+    cube = np.ravel_multi_index((bones, *cubes.T), (int(bones.max()) + 1, *(cubes.max(axis=0) + 1).tolist()))
+    sums = np.stack([np.bincount(bones, along) for along in points.T], axis=-1)
+    middle = sums / np.maximum(np.bincount(bones), 1)[:, None]
+    order = np.lexsort((-((points - middle[bones]) ** 2).sum(axis=1), cube))
+    first = np.append(True, np.diff(cube[order]) > 0)
+    stands_for = np.empty(len(points), dtype=np.intp)
+    stands_for[order] = order[first][np.cumsum(first) - 1]
+    corners = {number: stands_for[triangles] for number, triangles in parts.items()}
+    return {number: part[(part != part[:, [1, 2, 0]]).all(axis=1)] for number, part in corners.items()}
 
 
 def outsides(points: Array, triangles: Indices) -> Array:

@@ -40,8 +40,8 @@ SHIN_DEEP, THIGH_DEEP = {**DEEP, "youngs_modulus": 215e3}, {**DEEP, "youngs_modu
 """The same in which it sinks 20 and 50 cm."""
 
 
-def walker(scene, frames=FRAMES, rate=24, **material):
-    armature = shots.walker(scene, frames=frames, rate=rate)
+def walker(scene, frames=FRAMES, rate=24, coarseness=shots.COARSE, **material):
+    armature = shots.walker(scene, frames=frames, rate=rate, coarseness=coarseness)
     bpy.ops.softground.add_character()
     options = scene.softground
     options.frame_end, options.sink_feet, options.pressure = frames, True, "CENTRE_OF_PRESSURE"
@@ -91,16 +91,19 @@ def in_the_ground(footprints, places, frame, cell=CELL):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("snow", "cell"),
+    ("snow", "cell", "coarseness"),
     [
-        (SHIN_DEEP, CELL),
-        pytest.param(DEEP, CELL, marks=pytest.mark.slow),
-        pytest.param(THIGH_DEEP, CELL, marks=pytest.mark.slow),
-        pytest.param(DEEP, CELL / 2, marks=pytest.mark.slow),
+        (SHIN_DEEP, CELL, shots.COARSE),
+        pytest.param(DEEP, CELL, shots.COARSE, marks=pytest.mark.slow),
+        pytest.param(THIGH_DEEP, CELL, shots.COARSE, marks=pytest.mark.slow),
+        pytest.param(DEEP, CELL / 2, shots.COARSE, marks=pytest.mark.slow),
+        pytest.param(DEEP, CELL / 2, 1.0, marks=pytest.mark.slow),  # whose skin is finer than what carves
     ],
 )
-def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_any_frame(scene, skins, snow, cell):
-    walker(scene, **snow)
+def test_no_part_of_the_skin_is_further_than_a_cell_below_the_shown_surface_at_any_frame(
+    scene, skins, snow, cell, coarseness
+):
+    walker(scene, coarseness=coarseness, **snow)
     scene.softground.cell_size = cell
     _, record_of_bake = bake(scene)
     (skin,) = skins
