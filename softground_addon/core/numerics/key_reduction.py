@@ -35,61 +35,61 @@ def kept_samples(values: Array, tolerance: float) -> Indices:
     """
     keep = np.zeros(len(values), dtype=bool)
     keep[[0, -1]] = True
-    bend_lines(np.arange(float(len(values))), values[:, None], keep[:, None], np.full((1, values.shape[1]), tolerance))
+    margin = np.full((values.shape[1], 1), tolerance)
+    bend_lines(np.arange(float(len(values))), values.T, np.zeros(len(values), dtype=np.intp), keep, margin)
     return np.flatnonzero(keep)
 
 
-def bend_lines(frames: Array, values: Array, knot: NDArray[np.bool_], margin: Array) -> Array:
+def bend_lines(when: Array, values: Array, point: Indices, knot: NDArray[np.bool_], margin: Array) -> Array:
     """Add knots, each where a line between two knots is farthest from the values, until all lines are near enough.
 
     Parameters
     ----------
-    frames : (T,) float array
-        When the samples are.
-    values : (T, K, C) float array
-        C values of K points, which bend at the same knots.
-    knot : (T, K) bool array
+    when : (S,) float array
+        Frames of samples, ascending for each point.
+    values : (C, S) float array
+        C values, which bend at the same knots.
+    point : (S,) int array
+        The one of K points that each sample is of, ascending.
+    knot : (S,) bool array
         Where the lines of each point begin and end; gains the knots that are added.
-    margin : (K, C) float array
+    margin : (C, K) float array
         Largest distance from a line.
 
     Returns
     -------
-    (K, C) float array
+    (C, K) float array
         The largest remaining distance.
     """
-    count, points, channels = values.shape
-    # Channel by channel, and in each one point after the other, so that samples between two knots are contiguous.
-    rows, when = np.ascontiguousarray(values.T).reshape(channels, -1), np.tile(frames, points)
-    error = np.zeros((channels, points))
-    at = np.flatnonzero(knot.T)
-    begin, end = _with_samples_between(at[:-1], at[1:], count)
+    error = np.zeros(margin.shape)
+    at = np.flatnonzero(knot)
+    begin, end = _with_samples_between(at[:-1], at[1:], point)
     while len(begin):
         inside = end - begin - 1
         first = np.cumsum(inside) - inside
         sample = np.arange(inside.sum()) + np.repeat(begin + 1 - first, inside)
         share = (when[sample] - np.repeat(when[begin], inside)) / np.repeat(when[end] - when[begin], inside)
-        low = rows.take(begin, axis=1)
-        missed = np.repeat(rows.take(end, axis=1) - low, inside, axis=1)
+        low = values.take(begin, axis=1)
+        missed = np.repeat(values.take(end, axis=1) - low, inside, axis=1)
         missed *= share
         missed += np.repeat(low, inside, axis=1)
-        missed -= rows.take(sample, axis=1)
+        missed -= values.take(sample, axis=1)
         np.abs(missed, out=missed)
-        excess = (missed / np.repeat(margin.T[:, begin // count], inside, axis=1)).max(axis=0)
+        excess = (missed / np.repeat(margin.take(point[begin], axis=1), inside, axis=1)).max(axis=0)
         worst = np.maximum.reduceat(excess, first)
         fits = worst <= 1.0
         for of_channel, gap in zip(error, np.maximum.reduceat(missed, first, axis=1), strict=True):
-            np.maximum.at(of_channel, begin[fits] // count, gap[fits])
+            np.maximum.at(of_channel, point[begin[fits]], gap[fits])
         farthest = np.flatnonzero(excess == np.repeat(worst, inside))
         bend = sample[farthest[np.searchsorted(farthest, first[~fits])]]
-        knot[bend % count, bend // count] = True
+        knot[bend] = True
         begin, end = _with_samples_between(
-            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
+            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), point
         )
-    return error.T
+    return error
 
 
-def _with_samples_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
-    """Lines between rows of points, `count` each, that have rows between their ends."""
-    longer = (end - begin > 1) & (begin // count == end // count)
+def _with_samples_between(begin: Indices, end: Indices, point: Indices) -> tuple[Indices, Indices]:
+    """Lines between samples of one point that has others between them."""
+    longer = (end - begin > 1) & (point[begin] == point[end])
     return begin[longer], end[longer]

@@ -89,7 +89,7 @@ class Fit:
     error: Array
 
 
-def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
+def fit(frames: Array, histories: Array, tolerance: Array, ends: Array | None = None) -> Fit:
     """Stand a few ramps in for histories that change now and then.
 
     Each movement begins as one straight line through its ends; where the values are farther from it than the tolerance,
@@ -104,6 +104,8 @@ def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
         Values of K points, 0 at the first frame.
     tolerance : (C,) or (K, C) float array
         Largest error of each value while it moves.
+    ends : (K, C) float array, optional
+        Points move from when one of their values is further than this from its first, until none is from its last.
 
     Returns
     -------
@@ -117,17 +119,40 @@ def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
     >>> pressed.ramps.start, pressed.ramps.end, pressed.ramps.change
     (array([2.]), array([4.]), array([[-0.015625]]))
     """
-    count, points, channels = histories.shape
-    values = np.round(histories / QUANTUM) * QUANTUM
-    knot = _ends_of_movements(values)
-    margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), (points, channels))
-    error = bend_lines(frames, values, knot, margin)
-    values, when = values.transpose(1, 0, 2).reshape(-1, channels), np.tile(frames, points)
-    at = np.flatnonzero(knot.T)
-    change = np.diff(values[at], axis=0)
-    ramp = np.flatnonzero((at[:-1] // count == at[1:] // count) & change.any(axis=1))
-    start, stop = at[:-1][ramp], at[1:][ramp]
-    return Fit(Ramps(start // count, when[start], when[stop], change[ramp]), error + QUANTUM / 2)
+    of_channels = np.moveaxis(histories, -1, 0)
+    margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), histories.shape[1:]).T
+    start, stop, off = _spans(of_channels, np.zeros_like(margin) if ends is None else ends.T)
+    count = stop - start + 1
+    first = np.cumsum(count) - count
+    point = np.repeat(np.arange(len(count)), count)
+    number = np.arange(len(point)) - np.repeat(first - start, count)
+    values = np.stack([of_channel[number, point] for of_channel in of_channels])
+    values[:, first] = 0.0
+    values[:, first + count - 1] = of_channels[:, -1]
+    values = np.round(values / QUANTUM) * QUANTUM
+    knot = _ends_of_movements(values, point)
+    error = bend_lines(frames[number], values, point, knot, margin)
+    at = np.flatnonzero(knot)
+    change = np.diff(values.take(at, axis=1)).T
+    ramp = np.flatnonzero((point[at[:-1]] == point[at[1:]]) & change.any(axis=1))
+    when = frames[number[at]]
+    return Fit(Ramps(point[at[ramp]], when[ramp], when[ramp + 1], change[ramp]), (error + off).T + QUANTUM / 2)
+
+
+def _spans(histories: Array, ends: Array) -> tuple[Indices, Indices, Array]:
+    """First and last sample of the movements of points, (K,) each; and how far they are off for that (C, K)."""
+    samples = np.arange(histories.shape[1])[:, None]
+    moved, remaining = np.abs(histories), np.abs(histories - histories[:, -1:])
+    begun, going = ((far > ends[:, None]).any(axis=0) for far in (moved, remaining))
+    begin = np.where(begun.any(axis=0), begun.argmax(axis=0), len(samples))
+    end = np.where(going.any(axis=0), len(samples) - 1 - going[::-1].argmax(axis=0), -1)
+    if not ends.any():
+        off = np.zeros_like(ends)
+    else:
+        off = np.where(samples > end, remaining, np.where(samples < begin, moved, 0.0)).max(axis=1)
+    start: Indices = np.clip(np.minimum(begin, end + 1) - 1, 0, None)
+    stop: Indices = np.clip(end + 1, 1, len(samples) - 1)
+    return start, stop, off
 
 
 def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float]) -> Ramps:
@@ -154,13 +179,13 @@ def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float
     return side_by_side([more, Ramps(still, start, end, whole[still])])
 
 
-def _ends_of_movements(values: Array) -> NDArray[np.bool_]:
-    """True where movements of points begin or end, (T, K), from their values (T, K, C)."""
-    moves = (np.diff(values, axis=0) != 0).any(axis=-1)
-    step, never = np.arange(len(moves))[:, None], len(moves) + REST
-    before = np.maximum.accumulate(np.where(moves, step, -never), axis=0)
-    after = np.minimum.accumulate(np.where(moves, step, 2 * never)[::-1], axis=0)[::-1]
-    moving = np.zeros((len(values) + 1, values.shape[1]), dtype=bool)
-    moving[1:-1] = after - before <= REST
+def _ends_of_movements(values: Array, point: Indices) -> NDArray[np.bool_]:
+    """True where movements of points begin or end, (S,), from their values (C, S); `point` as of `bend_lines`."""
+    moves = (np.diff(values) != 0).any(axis=0) & (np.diff(point) == 0)
+    count = len(moves)
+    before = np.maximum.accumulate(np.where(moves, np.arange(count), -1))
+    after = np.minimum.accumulate(np.where(moves, np.arange(count), count)[::-1])[::-1]
+    moving = np.zeros(count + 2, dtype=bool)
+    moving[1:-1] = (before >= 0) & (after < count) & (after - before <= REST) & (point[before] == point[after])
     ends: NDArray[np.bool_] = moving[1:] != moving[:-1]
     return ends
