@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..ground.heightfield import HeightField
-from ..numerics.arrays import Array, Mask
+from ..numerics.arrays import Array
 from ..record.footprints import Footprint, recompose
 from .amounts import Amounts
 from .layers import Around
@@ -45,35 +45,31 @@ def lumps(carve: Footprint, loose: HeightField, x: Array, y: Array, amounts: Amo
     if amounts.crumbs is None or not len(x):
         return np.zeros(len(x))
 
-    def thickness(x: Array, y: Array) -> Array:
-        return np.asarray(np.maximum(loose.sample(x, y)[1], 0.0) * _laid_by(carve, x, y))
+    window, laid = carve.window, carve.tile(carve.rim) > 0
 
-    low, high = carve.window.corners(carve.cell_size)
+    def thickness(x: Array, y: Array) -> Array:
+        column, row = (np.floor(place / carve.cell_size).astype(np.intp) for place in (x, y))
+        lies = window.holds(row, column) & laid[window.cells_under(x, y, carve.cell_size)]
+        thick = np.zeros(len(x))
+        thick[lies] = np.maximum(loose.sample(x[lies], y[lies])[1], 0.0)
+        return thick
+
+    low, high = window.corners(carve.cell_size)
     sizes = scattered(
         amounts.surface, SEED, low, high, lambda x, y: np.minimum(thickness(x, y) / THICK, 1.0),
         share=SHARE * amounts.crumbs.share, smallest=smallest, fineness=1.0,
     )  # fmt: skip
 
-    def heights(x: Array, y: Array) -> Array:
-        nothing = np.zeros(len(x))
-        around = Around(SEED, x, y, x, y, nothing, nothing, smallest, 1.0)
-        return np.asarray(sum((size.heights(around) for size in sizes), nothing) * (thickness(x, y) > 0))
+    def raised_at(x: Array, y: Array, thick: Array) -> Array:
+        lies = thick > 0
+        x, y, nothing = x[lies], y[lies], np.zeros(np.count_nonzero(lies))
+        around, risen = Around(SEED, x, y, x, y, nothing, nothing, smallest, 1.0), np.zeros(len(lies))
+        risen[lies] = sum((size.heights(around) for size in sizes), nothing)
+        return risen
 
-    of_cells = [place.ravel() for place in np.meshgrid(*carve.window.centres(carve.cell_size))]
-    raised = float(heights(*of_cells).sum()) / max(float(thickness(*of_cells).sum()), 1e-12)
-    part = min(1.0, DEEPEST / max(raised, 1e-12))
-    return part * (heights(x, y) - raised * thickness(x, y))
-
-
-def _laid_by(carve: Footprint, x: Array, y: Array) -> Mask:
-    """True at places (N,) where a carve laid loose matter."""
-    laid = carve.tile(carve.rim) > 0
-    column, row = (np.floor(place / carve.cell_size).astype(np.intp) for place in (x, y))
-    holds = carve.window.holds(row, column)
-    return (
-        holds
-        & laid[
-            np.clip(row - carve.window.row, 0, carve.window.rows - 1),
-            np.clip(column - carve.window.column, 0, carve.window.columns - 1),
-        ]
-    )
+    across, up = window.centres(carve.cell_size)
+    row, column = np.nonzero(laid)
+    thick = thickness(across[column], up[row])
+    raised = float(raised_at(across[column], up[row], thick).sum()) / max(float(thick.sum()), 1e-12)
+    part, thick = min(1.0, DEEPEST / max(raised, 1e-12)), thickness(x, y)
+    return part * (raised_at(x, y, thick) - raised * thick)
