@@ -158,12 +158,13 @@ def test_a_bake_after_a_change_works_out_only_what_follows_from_it(scene, settin
     below(f"a bake after a change of {setting} over a whole one", again / whole, share)
 
 
+@pytest.mark.parametrize("relief", ["OFF", "FINE"])
 @pytest.mark.parametrize("cell", [0.01, 0.005])
-def test_a_bake_with_carving_takes_little_longer_and_plays_as_fast(scene, cell):
+def test_a_bake_with_carving_takes_little_longer_and_plays_as_fast(scene, cell, relief):
     shots.walker(scene, frames=DEEP_FRAMES, coarseness=1.0)
     bpy.ops.softground.add_character()
     options = scene.softground
-    options.frame_end, options.cell_size, options.sink_feet = DEEP_FRAMES, cell, True
+    options.frame_end, options.cell_size, options.sink_feet, options.relief = DEEP_FRAMES, cell, True, relief
     options.pressure, options.material.layer_depth = "CENTRE_OF_PRESSURE", 0.6
     options.material.youngs_modulus, options.material.poisson_ratio = 123e3, 0.0  # in which it sinks 35 cm
     baked, played, recorded = {}, {}, {}
@@ -177,7 +178,7 @@ def test_a_bake_with_carving_takes_little_longer_and_plays_as_fast(scene, cell):
                 baked[options.carve] = min(seconds, baked.get(options.carve, inf))
             played[options.carve] = np.minimum(frames, played.get(options.carve, inf))
     steps = len(baked_ground.record_of(options.ground).carves)
-    of_cells = f"cells of {cell * 1e3:g} mm"
+    of_cells = f"cells of {cell * 1e3:g} mm, relief {relief.lower()}"
     rows = (
         (f"a bake with carving over one without, {of_cells}", baked[True] / baked[False], 1.6, "times"),
         (f"a frame of it over one without, {of_cells}", played[True].mean() / played[False].mean(), 1.15, "times"),
