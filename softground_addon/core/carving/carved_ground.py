@@ -51,14 +51,11 @@ class Part(NamedTuple):
         Of the body.
     corners : (3, T) int array
         Triangles between them.
-    sides : (T,) float array
-        See `responded_skin.outsides`.
     """
 
     step: CarvedStep
     vertices: Indices
     corners: Indices
-    sides: Array
 
 
 class Drawn(NamedTuple):
@@ -95,13 +92,6 @@ def numbered(corners: Indices, count: int) -> tuple[Indices, Indices]:
     used = np.flatnonzero(place)
     place[used] = np.arange(len(used))
     return used, place.take(corners)
-
-
-def _below(moves: Array, corners: Indices, sides: Array) -> Mask:
-    """True for triangles (3, T) but those that face up at both ends of a frame, (T,); vertices (2, 3, V) at these."""
-    (a, p), (b, q), (c, r) = (moves[:, :2].take(corner, axis=2).swapaxes(0, 1) for corner in corners)
-    above: Mask = (sides * ((b - a) * (r - p) - (c - a) * (q - p)) > 0).all(axis=0)
-    return ~above
 
 
 def _passed(around: Array, corners: Indices, needed: Array) -> tuple[Array, Indices]:
@@ -205,7 +195,6 @@ class CarvedGround:
         low = lowest < top + HIGHEST  # what is laid in this frame heaps up
         near = np.flatnonzero(np.logical_or.reduce([low.take(corner) for corner in part.corners]))
         corners = part.corners.take(near, axis=1)
-        corners = corners.compress(_below(moves[1:3], corners, part.sides.take(near)), axis=1)
         if not corners.size:
             return None
         used, corners = numbered(corners, len(low))

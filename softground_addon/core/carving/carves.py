@@ -30,7 +30,7 @@ from ..record.throws import Throw
 from .carved_ground import CarvedGround, Part, numbered
 from .carved_step import CarvedStep, is_deep
 from .carver import Walls
-from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, outsides, thinned
+from .responded_skin import NO_SOLE, RespondedSkin, WornSkin, thinned
 
 FRAMES_AT_ONCE = 16
 """Frames whose skin is worked out together."""
@@ -179,19 +179,17 @@ class _Body:
         """Frame from which the sole of each part is away from its last step."""
         places = skin.at(np.zeros(1, dtype=np.intp))[0]
         every = thinned(places, skin.triangles, skin.bones, cell_size)
-        lengths = np.cumsum([len(triangles) for triangles in every.values()])
-        outward = np.split(outsides(places, np.concatenate(list(every.values()))), lengths[:-1])
         near = skin.near(terrain, NEAR)
         used = numbered(np.concatenate([each[near[each].any(axis=1)] for each in every.values()]).T, len(near))[0]
         self.poses = _poses(skin, used)
-        for (sole, triangles), sides in zip(every.items(), outward, strict=True):
+        for sole, triangles in every.items():
             goes = (step.is_deep if sole == NO_SOLE else step.footprint.sole == soles[sole] for step in of_body)
             taken = [step for step, does in zip(of_body, goes, strict=True) if does]
             is_near = near[triangles].any(axis=1)
             if taken and is_near.any():
                 of_used = np.searchsorted(used, triangles[is_near].T)
                 nearest = _nearest(taken, skin.frames)
-                self._parts.append((sole, taken, nearest, *numbered(of_used, len(used)), sides[is_near]))
+                self._parts.append((sole, taken, nearest, *numbered(of_used, len(used))))
                 away = taken[nearest[-1]].footprint.end_frame + AWAY * skin.frame_rate
                 self._away.append(int(np.searchsorted(skin.frames, away)))
 

@@ -13,12 +13,10 @@ from ..ground.heightfield import Terrain
 from ..legs.grounding import Response, leg_soles
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Array, Indices, Mask
-from ..numerics.components import components
 from ..rig.bones import RigBones, above, family
 from ..rig.mapping import RigMapping
 from ..rig.recording import Recording
 from ..rig.rig_skin import RigSkin, of_body, skinned
-from ..skin.volume import welded
 
 NO_SOLE = -1
 """In place of the sole of skin that belongs to several, as a trunk does, or to none."""
@@ -153,27 +151,6 @@ def thinned(points: Array, parts: Mapping[int, Indices], bones: Indices, size: f
     stands_for[order] = order[first][np.cumsum(first) - 1]
     corners = {number: stands_for[triangles] for number, triangles in parts.items()}
     return {number: part[(part != part[:, [1, 2, 0]]).all(axis=1)] for number, part in corners.items()}
-
-
-def outsides(points: Array, triangles: Indices) -> Array:
-    """Sides of triangles (T, 3) that are outside: 1 where their normals point out of a closed piece, -1 where into it.
-
-    Of open pieces, 0: no side of theirs is known to be outside.
-
-    Examples
-    --------
-    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
-    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> outsides(corners, faces), outsides(corners, faces[:, ::-1]), outsides(corners, faces[:3])
-    (array([1., 1., 1., 1.]), array([-1., -1., -1., -1.]), array([0., 0., 0.]))
-    """
-    corners, count = welded(points)[triangles], len(points)
-    start, end = np.concatenate([corners[:, [k, (k + 1) % 3]] for k in range(3)]).T
-    piece = components(count, start, end)[corners[:, 0]]
-    is_lone = ~np.isin(start * count + end, end * count + start)
-    volume = np.bincount(piece, np.linalg.det(points[triangles] - points.mean(axis=0)))
-    is_open = np.bincount(np.tile(piece, 3), is_lone) > 0
-    return np.asarray(np.where(is_open, 0.0, np.sign(volume))[piece])
 
 
 def _parts_of_bones(worn: WornSkin, motion: CharacterMotion, response: Response) -> dict[str, Array]:

@@ -146,10 +146,7 @@ def _spans(histories: Array, ends: Array) -> tuple[Indices, Indices, Array]:
     begun, going = ((far > ends[:, None]).any(axis=0) for far in (moved, remaining))
     begin = np.where(begun.any(axis=0), begun.argmax(axis=0), len(samples))
     end = np.where(going.any(axis=0), len(samples) - 1 - going[::-1].argmax(axis=0), -1)
-    if not ends.any():
-        off = np.zeros_like(ends)
-    else:
-        off = np.where(samples > end, remaining, np.where(samples < begin, moved, 0.0)).max(axis=1)
+    off = np.where(samples > end, remaining, np.where(samples < begin, moved, 0.0)).max(axis=1)
     start: Indices = np.clip(np.minimum(begin, end + 1) - 1, 0, None)
     stop: Indices = np.clip(end + 1, 1, len(samples) - 1)
     return start, stop, off
