@@ -14,6 +14,7 @@ from .importing import import_capture
 from .operators import (
     add_weather,
     bake_result,
+    clinging,
     give_way,
     live_footprints,
     modal_bake,
@@ -53,6 +54,7 @@ CLASSES = (
     *ground_list.CLASSES,
     *cover_object.CLASSES,
     *give_way.CLASSES,
+    *clinging.CLASSES,
     *sample_scene.CLASSES,
     *modal_bake.CLASSES,
     *modal_job.CLASSES,

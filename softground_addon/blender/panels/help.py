@@ -33,6 +33,7 @@ PAGES = (
     ("bpy.ops.softground.*root_motion", "response.html#root-motion"),
     ("bpy.ops.softground.*weather", "after.html#weather"),
     ("bpy.ops.softground.give_way", "after.html#plants-and-litter"),
+    ("bpy.ops.softground.cling", "after.html#snow-and-mud-on-legs"),
     ("bpy.ops.softground.add_sample_meadow", "after.html#plants-and-litter"),
     ("bpy.ops.softground.make_sound", "after.html#sound"),
     ("bpy.ops.softground.event_*", "after.html#events"),

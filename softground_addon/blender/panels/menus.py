@@ -59,6 +59,7 @@ class SOFTGROUND_MT_output(bpy.types.Menu):
         layout.operator("softground.make_sound", icon="SOUND")
         layout.operator("softground.make_keys", icon="KEYINGSET")
         layout.operator_menu_enum("softground.give_way", "kind", icon="STRANDS")
+        layout.operator("softground.cling", icon="MOD_CLOTH")
         layout.separator()
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
