@@ -107,14 +107,14 @@ def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     open_air.add_haze(scene.world, *AIR)
     figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
     coat = next(number for number, slot in enumerate(figure.material_slots) if "coat" in slot.material.name.lower())
-    fur.add_fur(figure, HAIRS, _lie, _coat, THICKNESS, coat)
+    fur.add_fur(figure, HAIRS, lie, coat_of, THICKNESS, coat)
     scene.view_settings.exposure = 0.35
     path = folder / "fox_in_powder.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
 
 
-def _lie(place: Array, normal: Array, chance: np.random.Generator) -> Array:
+def lie(place: Array, normal: Array, chance: np.random.Generator) -> Array:
     """Hairs from root to tip [m]: short on face and legs, long on cheeks, belly and tail; they point backward."""
     ahead, _, up = _in_body(place)
     flow = np.tile((0.0, 1.0, -0.30), (len(place), 1))
@@ -134,7 +134,7 @@ def _lie(place: Array, normal: Array, chance: np.random.Generator) -> Array:
     return (length * chance.uniform(0.6, 1.15, len(place)))[:, None] * (flow + stands * normal)
 
 
-def _coat(place: Array, normal: Array, chance: np.random.Generator) -> Array:
+def coat_of(place: Array, normal: Array, chance: np.random.Generator) -> Array:
     """Red above, white below and at the tip of the tail, black on legs and behind the ears."""
     ahead, _, up = _in_body(place)
     blurred = chance.normal(0.0, 0.02, (3, len(place)))

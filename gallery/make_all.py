@@ -22,7 +22,7 @@ HEROES = (
     "bare_feet",
     "fox_in_powder",
     "wading",
-    "dog_in_snow",
+    "fox_in_deep_snow",
     "before_after",
     "time_lapse",
 )

@@ -68,6 +68,26 @@ def wear_creased(armature: bpy.types.Object, body: Body) -> None:
     _wear(figure, "jacket", _cloth(figure.data, "shell", _JACKET, ((waist, 0.010),), 0.006))
 
 
+def wear_snow(armature: bpy.types.Object) -> None:
+    """Snow in patches on boots and trousers, as high as each leg has waded (`softground_clung`)."""
+    bpy.ops.softground.cling()
+    for slot in stage.figure_of(armature).material_slots:
+        if not slot.material.name.endswith(("cloth", "leather", "rubber")):
+            continue
+        tree = slot.material.node_tree
+        shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+        colour, graph = shader.inputs["Base Color"], Graph(tree)
+        place = graph.out(graph.node("ShaderNodeTexCoord"), 3)
+        ragged = graph.attribute("softground_clung") + graph.swing(place, 0.05, 3.0) * 0.16
+        patches = graph.ramp(graph.noise(place, 0.022, 4.0, 0.6) + graph.ramp(ragged, 0.0, 0.25) * 0.16, 0.52, 0.6)
+        snow = graph.ramp(ragged, 0.0, 0.02) * patches
+        clad = graph.mix(snow, tuple(colour.default_value)[:3], (0.80, 0.83, 0.88))
+        if colour.links:
+            bare = next(socket for socket in clad.output.node.inputs if socket.identifier == "A_Color")
+            tree.links.new(colour.links[0].from_socket, bare)
+        tree.links.new(clad.output, colour)
+
+
 def wear_rucksack(armature: bpy.types.Object, body: Body) -> None:
     """A rucksack with a lid, pockets, a rolled mat and straps over the shoulders."""
     s = body.stature / 1.78

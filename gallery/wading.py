@@ -56,6 +56,7 @@ def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     outfit.wear_boots(hiker, Body())
     outfit.wear_creased(hiker, Body())
     outfit.wear_rucksack(hiker, Body())
+    outfit.wear_snow(hiker)
     chance = np.random.default_rng(8)
     spots = np.column_stack([-chance.uniform(20.0, 120.0, FIRS), chance.normal(0.0, 45.0, FIRS)])
     firs.add_firs(spots, chance.uniform(4.0, 13.0, FIRS), HEIGHT, firs.WINTRY, snow=0.7)
