@@ -48,10 +48,15 @@ def is_current(ground: bpy.types.Object) -> bool:
 
 
 def is_idle(ground: bpy.types.Object) -> bool:
-    """True if a ground has a table and no plants that give way by it any more: it alone refers to the table, which is
-    told without a walk over all objects."""
+    """True if a ground has a table and no plants that give way by it any more: it alone refers to the table, or nobody
+    to the group, which is told without a walk over all objects.
+
+    Blender 5.2 counts a removed modifier's table for good, but not its group.
+    """
     table = of(ground)
-    return table is not None and table.users <= 1
+    if table is None or table.users <= 1:
+        return table is not None
+    return not any(tree.users > tree.use_fake_user for tree in filter(nodes.is_give_way, bpy.data.node_groups))
 
 
 def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
