@@ -67,6 +67,7 @@ def _put(
         "Stands": kind not in LITTER,
         "Rolls": LITTER.get(kind, 0.0) / unit_scale,
         "Sinks": not follows,
+        "Surface": getattr(obj.data, "surface", None) if follows else None,
         "Loose Parts": is_loose,
     }
     set_inputs(modifier, values)

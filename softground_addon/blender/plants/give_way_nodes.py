@@ -21,9 +21,8 @@ from ...core.numerics.slices import Slices, sliced
 from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
-from ..playback.weather_nodes import RAISED
 from . import litter_nodes, wind_nodes
-from .table_nodes import Table, any_of, at_element, in_cells, is_over, slot_of, table_of, turned
+from .table_nodes import Table, any_of, at_element, in_cells, is_over, raised_at, slot_of, table_of, turned
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
 
 GROUP = "SoftGround Give Way"
@@ -45,6 +44,7 @@ INPUTS = (
     GroupInput("Stands", True, "Plants that bend; off for what lies on the ground and tilts with it", kind="Bool"),
     GroupInput("Sinks", True, "Press roots into the prints; off where the scatter follows the ground", kind="Bool"),
     GroupInput("Loose Parts", False, "Bend each separate part of a mesh about its lowest vertices", kind="Bool"),
+    GroupInput("Surface", None, "Ground that hair curves follow: its snow does not lift them", kind="Object"),
     GroupInput("Rolls", 0.0, "How far what lies there rolls where the ground is too hard to press it in", (0.0, 10.0)),
 )
 BURIED = 0.5
@@ -251,7 +251,7 @@ def _given_way(
     found, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
     place = place.socket
     # Height by which snow lifts what stands on it, where that does not sink by itself.
-    snow = graph.number(graph.choose("FLOAT", table.sinks, graph.attribute(RAISED), 0.0))
+    snow = graph.number(graph.choose("FLOAT", table.sinks, raised_at(graph, table, root), 0.0))
     is_lifted = snow.above(0.0)
     is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, found, is_lifted.socket, domain), 0)
     is_near = graph.either(table.is_windy.socket, any_of(graph, found, is_over(graph, table, place), domain))

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from ..nodes.node_graph import NodeGraph, Number
+from ..playback.weather_nodes import RAISED
 from .trampling_layout import META, THROWN_FROM, TILES, WIND
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -49,6 +50,7 @@ class Table:
     stands: Any
     rolls: Any
     sinks: Any
+    surface: Any
 
     @property
     def up(self) -> Any:
@@ -82,7 +84,17 @@ def table_of(graph: NodeGraph, chosen: Any) -> Table:
     wind = graph.number(graph.at_index(vertices, graph.attribute(WIND), 0, "FLOAT"))
     numbers = row, tile, frame_rate, columns, rows, first_frame, cell, gravity, radius, wind
     space = to_scatter, cell_up, ways, axes, origin.outputs["Vector"]
-    return Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks")))
+    return Table(vertices, *space, *numbers, *(chosen[name] for name in ("Stands", "Rolls", "Sinks", "Surface")))
+
+
+def raised_at(graph: NodeGraph, table: Table, root: Any) -> Any:
+    """Height by which snow raises the ground under a root [m]: as the root has it, or the surface that it grows on."""
+    surface = graph.node("GeometryNodeObjectInfo", {"Object": table.surface}, transform_space="RELATIVE")
+    mesh, own = surface.outputs["Geometry"], graph.attribute(RAISED)
+    is_raised = graph.at_index(mesh, own.node.outputs["Exists"], 0, "BOOLEAN")
+    inputs = {"Mesh": mesh, "Value": own, "Sample Position": root}
+    nearest = graph.node("GeometryNodeSampleNearestSurface", inputs, data_type="FLOAT").outputs["Value"]
+    return graph.choose("FLOAT", is_raised, own, nearest)
 
 
 def turned(graph: NodeGraph, direction: Any, by: Any) -> Any:

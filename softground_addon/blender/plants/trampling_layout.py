@@ -1,6 +1,6 @@
 """Layout of the table by which plants give way: names of its attributes, and its version."""
 
-MARK, VERSION = "softground_give_way", 5
+MARK, VERSION = "softground_give_way", 6
 """Custom property of the group and of the table's vertices: the version of how they fit together."""
 
 TILES, FIRST, SENT_BY = "softground_tiles", "softground_first", "softground_sent_by"

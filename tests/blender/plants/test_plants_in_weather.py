@@ -7,12 +7,13 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import compat
+from softground_addon.blender import compat, mesh_arrays
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes.node_modifiers import inputs_of
 from softground_addon.blender.plants import trampling_table
 from softground_addon.blender.playback import weather_modifier
 from softground_addon.core.plants.swaying import swayed
+from tests.blender.grounds import node_group
 from tests.blender.plants.test_give_way import (
     HEIGHT,
     RATE,
@@ -211,10 +212,40 @@ def on_the_ground(scatter):
     return scatter
 
 
+def attached():
+    """Hair curves on vertices of the ground along the trail, which is their surface and deforms them."""
+    ground = baked_ground.display_mesh_of(bpy.context.scene.softground.ground)
+    mesh, local = ground.data, mesh_arrays.positions(ground.data)
+    flat = (local[:, :2] - local[:, :2].min(axis=0)) / np.ptp(local[:, :2], axis=0)
+    vertex = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertex)
+    mesh.uv_layers.new(name="Map").data.foreach_set("uv", flat[vertex].astype(np.float32).ravel())
+    ground.add_rest_position_attribute = True
+    place = local + np.array(ground.matrix_world.translation)
+    chosen = np.flatnonzero((np.abs(place[:, 0]) < 0.3) & (np.abs(place[:, 1] + 1.0) < 1.0))[::50]
+    grass = hair(place[chosen])
+    grass.data.surface, grass.data.surface_uv_map = ground, "Map"
+    at = grass.data.attributes.new("surface_uv_coordinate", "FLOAT2", "CURVE").data
+    at.foreach_set("vector", flat[chosen].astype(np.float32).ravel())
+    tree, given, result = node_group()
+    deform = tree.nodes.new("GeometryNodeDeformCurvesOnSurface")
+    tree.links.new(given, deform.inputs["Curves"])
+    tree.links.new(deform.outputs["Curves"], result)
+    grass.modifiers.new("Surface Deform", "NODES").node_group = tree
+    return grass
+
+
+FOLLOWING = {
+    "instances on its vertices": (lambda: on_the_ground(scattered(roots())), "MEADOW"),
+    "litter on its vertices": (lambda: on_the_ground(scattered(roots())), "LITTER"),
+    "hair curves on its surface": (attached, "MEADOW"),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["MEADOW", "LITTER"])
-def test_snow_lifts_no_scatter_that_follows_the_ground(shot, kind):
-    scatter = on_the_ground(scattered(roots()))
+@pytest.mark.parametrize(("make", "kind"), FOLLOWING.values(), ids=FOLLOWING)
+def test_snow_lifts_no_scatter_that_follows_the_ground(shot, make, kind):
+    scatter = make()
     modifier = give_way(scatter, kind=kind)
     assert compat.read_input(modifier, inputs_of(modifier)["Sinks"]) is False
     before = {}
@@ -226,6 +257,8 @@ def test_snow_lifts_no_scatter_that_follows_the_ground(shot, kind):
         shot.frame_set(frame)
         for was, now in zip(before[frame], blades(scatter), strict=True):
             np.testing.assert_allclose(now, was, atol=1e-5)
+            if make is attached:  # whose tips turn with their surface
+                break
     modifier.show_viewport = False
     bpy.context.view_layer.update()
     assert np.median(blades(scatter)[0][:, 2] - before[48][0][:, 2]) > 0.05
