@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,8 @@ TALLEST = 1.5
 """Height above which soles bend nothing [m]."""
 TILE, MOST_TILES = 16, 1_000_000
 """Cells along the side of a tile, and tiles of the whole map, beyond which they are larger."""
+SHUTTER = 0.5
+"""Frames before the first of a shot from which on plants give way to feet that stand there: motion blur shows them."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
     is_next = np.concatenate([[False], slot[1:] == slot[:-1]])
     active = table["start"] - TALLEST / table["down"]
     active[is_next] = np.maximum(active[is_next], table["start"][:-1][is_next[1:]])
+    active = np.maximum(active, _first_frame(steps) - SHUTTER)
     return Tramplings(
         side,
         origin * side,
@@ -122,6 +125,12 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
         table["sink"],
         np.column_stack([table["slope_x"], table["slope_y"]]),
     )
+
+
+def _first_frame(steps: Sequence[Footprint]) -> float:
+    """First frame of the shot, in which the steps of contacts are numbered."""
+    kept = [(step, step.pressed_by) for step in steps if step.pressed_by is not None]
+    return min((step.load_frames[0] - by.first * step.load_spacing for step, by in kept), default=-np.inf)
 
 
 def _tiled(cells: Indices) -> tuple[Indices, int, Indices, Indices]:

@@ -184,10 +184,12 @@ def test_before_the_first_step_it_is_the_scatter_and_so_it_is_without_the_modifi
     before, modifiers = state(obj), fingerprints.of_object(obj)["modifiers"]
     data = fingerprints.of_mesh(obj.data) if obj.type == "MESH" else None
     modifier = give_way(obj)
-    shot.frame_set(-100)
-    assert state(obj) == before
-    shot.frame_set(30)
-    assert state(obj) != before
+    for frame in (-100, -10, 0):
+        shot.frame_set(frame)
+        assert state(obj) == before
+    for frame in (1, 30):  # a foot stands there as the shot begins
+        shot.frame_set(frame)
+        assert state(obj) != before
     obj.modifiers.remove(modifier)
     bpy.context.view_layer.update()
     assert state(obj) == before

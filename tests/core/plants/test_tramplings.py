@@ -13,7 +13,7 @@ from softground_addon.core.plants import bending
 from softground_addon.core.plants.bending import PLANTS, Pass, Plant, bend, cover, held, lasting_of
 from softground_addon.core.plants.sole_passes import BESIDE
 from softground_addon.core.plants.swings import SWING_HEIGHT
-from softground_addon.core.plants.tramplings import tramplings
+from softground_addon.core.plants.tramplings import SHUTTER, tramplings
 from softground_addon.core.record.footprints import recompose
 from tests.core.walkers import walk
 
@@ -85,6 +85,14 @@ def steps():
     """Footprints of two walks along one line, the second later, and the ground that they leave."""
     ground = SoftGround(FlatTerrain(), MUD)
     return [print_ for result in simulate([walk(steps=4)], ground, 0.01) for print_ in result.footprints]
+
+
+def test_no_blade_moves_before_the_first_frame_of_the_shot(steps):
+    """Where feet stand that would come down on tall blades earlier."""
+    first = min(step.load_frames[0] - step.pressed_by.first * step.load_spacing for step in steps)
+    table = tramplings(steps)
+    assert table.active.min() == first - SHUTTER
+    assert (table.active <= table.by.start).all()
 
 
 def shifted(steps, frames):
