@@ -172,8 +172,8 @@ class _Passes:
 
 
 def _passes(graph: NodeGraph, table: Table, plant: Plant, frame: Number) -> _Passes:
-    active = graph.separated(graph.attribute(ACTIVE, "FLOAT_VECTOR"))[0]
-    before = graph.accumulated(graph.compare("LESS_EQUAL", active, frame.socket), "INT").outputs["Leading"]
+    active, settled, _ = graph.parts(graph.attribute(ACTIVE, "FLOAT_VECTOR"))
+    before = graph.accumulated(graph.compare("LESS_EQUAL", active.socket, frame.socket), "INT").outputs["Leading"]
     counted, (before,) = graph.captured(table.vertices, graph.number(before), kinds="INT")
     index, first = graph.node("GeometryNodeInputIndex").outputs["Index"], graph.attribute(FIRST, "INT")
     following = at_element(graph, first, graph.math("ADD", index, 1.0), "POINT", "INT")
@@ -187,7 +187,7 @@ def _passes(graph: NodeGraph, table: Table, plant: Plant, frame: Number) -> _Pas
     by = Pass(start, end, down, up, reach, lasting, passes, above)
     (standing, weight), (worn, _) = (bend(by, plant, frame, table.frame_rate, chance) for chance in (NO_ONE, EVERYONE))
     held = graph.combined(standing.socket, worn.socket, cover(passes, plant.half_after).socket)
-    pressed = ((frame - start) / (end - start).at_least(1.0)).within_one()
+    pressed = ((frame - start) / (settled - start)).within_one()
     fields, kinds = (graph.number(held), weight, pressed), ("VECTOR", "FLOAT", "FLOAT")
     vertices, (held, weight, pressed) = graph.captured(table.vertices, *fields, kinds=kinds)
 

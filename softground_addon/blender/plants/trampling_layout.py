@@ -9,8 +9,9 @@ pass, numbered from 1, the first over its cell that trod on it, which sends off 
 ACTIVE, TIMES, PACE, LEAN, SHARES, SINK = (
     f"softground_{name}" for name in ("active", "times", "pace", "lean", "shares", "sink")
 )
-"""Vectors of each pass: frames from which it acts, and the next two; start, end and number; speeds and height above;
-direction, of two numbers; reach, what lasts, and 1 behind an earlier one; slope and height that it leaves."""
+"""Vectors of each pass: frames from which it acts and from which the ground stays, two numbers; start, end and number;
+speeds and height above; direction, two numbers; reach, what lasts, and 1 behind an earlier one; slope and height that
+it leaves."""
 WIND = "softground_wind"
 """Wind of the weather [m/s], where there is any; see `wind_nodes`."""
 META = "softground_meta"

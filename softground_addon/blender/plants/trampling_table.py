@@ -120,24 +120,21 @@ def _fill(vertices: bpy.types.Mesh, trampled: Tramplings, units: SceneUnits) -> 
         (columns * side - 1, rows * side - 1, active.min()),
         (size / scale, units.gravity_m_s2 / scale, layout.THROWN_FROM / scale),
     )
-    is_second = np.ones(len(active) + 2, bool)
-    is_second[trampled.first] = is_second[-2:] = False
-    following = np.where(is_second[1:-1], np.append(active[1:], NEVER), NEVER)
-    after = np.where(is_second[1:-1], np.append(following[1:], NEVER), NEVER)
-    second = is_second[:-2]
+    is_second = np.ones(len(active) + 1, bool)
+    is_second[trampled.first] = False
     arrays: tuple[tuple[str, str, NDArray[Any]], ...] = (
         (layout.META, "FLOAT_VECTOR", np.array(meta)),
         (layout.TILES, "FLOAT", (trampled.tiles - corner_column * side - corner_row * side**2).ravel()),
         (layout.FIRST, "INT", trampled.first + 1),
         (layout.SENT_BY, "INT", _first_to_tread(trampled) + 1),
+        (layout.ACTIVE, "FLOAT2", np.column_stack([active, trampled.settled * stretch])),
         (layout.LEAN, "FLOAT2", trampled.direction),
         *(
             (name, "FLOAT_VECTOR", np.column_stack(parts))
             for name, parts in (
-                (layout.ACTIVE, (active, following, after)),
                 (layout.TIMES, (by.start * stretch, by.end * stretch, by.passes)),
                 (layout.PACE, (by.down * pace, by.up * pace, by.above / scale)),
-                (layout.SHARES, (by.reach, by.lasting, second)),
+                (layout.SHARES, (by.reach, by.lasting, is_second[:-1])),
                 (layout.SINK, (trampled.slope, trampled.sink / size)),
             )
         ),

@@ -32,8 +32,9 @@ FRAME_RATE = 24.0
 """Of footprints that were edited, which do not know [1/s]."""
 
 OF_PASS = tuple(field.name for field in fields(Pass))
-COLUMNS = (*OF_PASS, "x", "y", "sink", "slope_x", "slope_y")
-"""Of a pass: its own fields, the direction in which blades lean, the change of the ground's height and its slope."""
+COLUMNS = (*OF_PASS, "x", "y", "sink", "slope_x", "slope_y", "settled")
+"""Of a pass: its own fields, the direction in which blades lean, the change of the ground's height and its slope, and
+the frame from which on the ground does not change any more, about."""
 
 
 def passes_of(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
@@ -82,9 +83,22 @@ def passes_of(step: Footprint, side: float) -> tuple[Indices, dict[str, Array]]:
         "sink": sink[cell],
         "slope_x": slope_x[cell],
         "slope_y": slope_y[cell],
+        "settled": _settled(step, coarse, window.cells, start[under][source], cell),
     }
     row, column = np.divmod(cell, window.columns)
     return np.stack([column + window.column, row + window.row], axis=1).astype(np.int64), table
+
+
+def _settled(step: Footprint, coarse: Indices, count: int, start: Array, cell: Indices) -> Array:
+    """Frames (N,) to which the ground of cells changes evenly from `start`, so that half of the change is in time."""
+    changes = step.compression, step.rim
+    of_cell = coarse[np.concatenate([change.cells[:] for change in changes])]
+    amount = np.abs(np.concatenate([change.amounts[:] for change in changes]))
+    frame = np.concatenate([np.repeat(change.frames, np.diff(change.first)) for change in changes])
+    weight = np.bincount(of_cell, amount, count)
+    total = np.bincount(of_cell, amount * (frame - 0.5 * step.frame_step), count)
+    mean = np.divide(total, weight, out=np.full(count, -np.inf), where=weight > 0)[cell]
+    return np.maximum(2.0 * mean - start, start + step.frame_step)
 
 
 def _nearest(marked: NDArray[np.bool_], rings: int) -> Indices:

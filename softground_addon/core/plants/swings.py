@@ -55,7 +55,7 @@ def swings(steps: Sequence[Footprint], side: float) -> Iterator[tuple[Indices, d
         ]
         constants = {"down": PASSING_SPEED / second, "up": PASSING_SPEED / second, "above": SWING_HEIGHT}
         table = {name: np.full(len(passed), constants.get(name, 0.0)) for name in COLUMNS}
-        table |= {"start": when[0], "end": when[1]}
+        table |= {"start": when[0], "end": when[1], "settled": when[1]}
         table["reach"] = np.where(gap > 0, BESIDE_BEND * (1.0 - gap / PARTED), 1.0)[:, 0]
         table["x"], table["y"] = np.where(gap > 0, aside, ahead).T
         row, column = np.divmod(passed, window.columns)

@@ -51,6 +51,8 @@ class Tramplings:
         Unit vectors in which blades lean.
     sink, slope : (P,) and (P, 2) float arrays
         Change of the ground's height at the middle of the cell after the pass [m], and its slope.
+    settled : (P,) float array
+        Scene frame from which on they do not change any more, about.
     """
 
     cell_size: float
@@ -63,6 +65,7 @@ class Tramplings:
     direction: Array
     sink: Array
     slope: Array
+    settled: Array
 
     def latest(self, x: Array, y: Array, frame: float = np.inf) -> Indices:
         """Number of the latest pass over places (N,) [m] that acts at a frame; -1 without any."""
@@ -124,6 +127,7 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
         np.column_stack([table["x"], table["y"]]),
         table["sink"],
         np.column_stack([table["slope_x"], table["slope_y"]]),
+        table["settled"],
     )
 
 

@@ -174,6 +174,21 @@ def test_roots_sink_with_the_ground_and_where_they_follow_it_they_do_not(shot, k
     np.testing.assert_allclose(blades(obj)[0][:, 2], 0.0, atol=1e-6)
 
 
+def test_roots_go_down_as_the_ground_does_while_soles_press_it(shot):
+    grass = hair(roots(3000))
+    give_way(grass)
+    ground = baked_ground.display_mesh_of(shot.softground.ground)
+    origin = np.array(ground.matrix_world.translation)
+    for frame in (10, 26, 28, 60):
+        shot.frame_set(frame)
+        shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        root = blades(grass)[0] - origin
+        below = np.array([shown.ray_cast(Vector((x, y, 1.0)), Vector((0.0, 0.0, -1.0)))[1].z for x, y, _ in root])
+        pressed = below < -0.005
+        assert pressed.sum() > 50
+        assert np.percentile(root[pressed, 2] - below[pressed], 90) < 0.008  # a cell is 2 cm wide, and walls are steep
+
+
 def state(obj):
     return np.concatenate(blades(obj)).tobytes()
 
