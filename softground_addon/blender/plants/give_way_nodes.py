@@ -22,7 +22,7 @@ from ...core.plants.bending import EVERYONE, NO_ONE, Pass, Plant, bend, cover
 from ..nodes.node_graph import NodeGraph, Number, build
 from ..nodes.node_modifiers import GroupInput, new_group
 from . import litter_nodes, wind_nodes
-from .table_nodes import Table, any_of, at_element, in_cells, is_over, raised_at, slot_of, table_of, turned
+from .table_nodes import UNITS, Table, any_of, at_element, in_cells, is_over, raised_at, slot_of, table_of, turned
 from .trampling_layout import ACTIVE, FIRST, LEAN, MARK, PACE, SHARES, SINK, TIMES, VERSION
 
 GROUP = "SoftGround Give Way"
@@ -49,6 +49,8 @@ INPUTS = (
 )
 BURIED = 0.5
 """Share of litter that a rim covers as it rises."""
+FLATTEST = 0.9999
+"""Share by which instances are laid flat, which without any thickness would have no sides to shade."""
 MEANS = 3
 """How many times the lower part of a blade of a mesh is taken, until its lowest vertices are left."""
 
@@ -310,28 +312,29 @@ def _put(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _M
 
 
 def _instances_moved(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:
-    """Turn instances about their origins: plants until they lie, litter with the ground."""
-    rotation = graph.node("GeometryNodeInputInstanceRotation").outputs["Rotation"]
-    turned = graph.node("FunctionNodeRotateVector", {"Vector": (0.0, 0.0, 1.0), "Rotation": rotation})
-    stem, level = turned.outputs["Vector"], graph.scaled(table.up, graph.dot(moved.lean, table.up))
-    toward = graph.vector("NORMALIZE", graph.vector("SUBTRACT", moved.lean, level))
-    to_lie = graph.math("ARCCOSINE", graph.dot(stem, toward))
-    axes = (graph.vector("CROSS_PRODUCT", *ways) for ways in ((stem, toward), (table.up, moved.lean)))
-    to_lie = graph.number(graph.choose("FLOAT", table.stands, to_lie, pi / 2))
-    turn = {"Axis": graph.choose("VECTOR", table.stands, *axes), "Angle": (graph.number(moved.bent) * to_lie).socket}
-    rotation = graph.node("FunctionNodeAxisAngleToRotation", turn)
-    rotated, shifted = graph.node("GeometryNodeRotateInstances"), graph.node("GeometryNodeTranslateInstances")
-    for node, name, value in (
-        (rotated, "Rotation", rotation.outputs["Rotation"]),
-        (shifted, "Translation", moved.shift),
-    ):
-        node.inputs["Local Space"].default_value = False
-        graph.link(geometry, node.inputs["Instances"])
-        graph.link(moved.is_touched, node.inputs["Selection"])
-        graph.link(value, node.inputs[name])
-        geometry = node.outputs["Instances"]
-    graph.link(position, rotated.inputs["Pivot Point"])
-    return geometry
+    """Lean plants about their origins as points do, tufts with all of their blades; turn litter with the ground."""
+    lean = graph.scaled(moved.lean, FLATTEST)
+    shift = graph.vector("SUBTRACT", moved.shift, graph.scaled(lean, graph.dot(position, table.up)))
+    along = zip(graph.separated(table.up), UNITS, strict=True)
+    columns = [*(graph.vector("MULTIPLY_ADD", lean, part, unit) for part, unit in along), shift]
+    by = graph.node("FunctionNodeCombineMatrix")
+    for number, column in enumerate(columns):
+        for row, part in enumerate(graph.separated(column)):
+            graph.link(part, by.inputs[4 * number + row])
+    before = graph.node("GeometryNodeInstanceTransform").outputs["Transform"]
+    leaning = graph.node("FunctionNodeMatrixMultiply", {0: by.outputs[0], 1: before}).outputs["Matrix"]
+    inputs = {"Instances": geometry, "Selection": moved.is_touched, "Transform": leaning}
+    leaning = graph.node("GeometryNodeSetInstanceTransform", inputs).outputs["Instances"]
+
+    axis = graph.vector("CROSS_PRODUCT", table.up, moved.lean)
+    turn = {"Axis": axis, "Angle": graph.math("MULTIPLY", moved.bent, pi / 2)}
+    rotation = graph.node("FunctionNodeAxisAngleToRotation", turn).outputs["Rotation"]
+    inputs = {"Instances": geometry, "Selection": moved.is_touched, "Local Space": False}
+    turned = {**inputs, "Rotation": rotation, "Pivot Point": position}
+    shifted = {**inputs, "Translation": moved.shift}
+    shifted["Instances"] = graph.node("GeometryNodeRotateInstances", turned).outputs["Instances"]
+    turned = graph.node("GeometryNodeTranslateInstances", shifted).outputs["Instances"]
+    return graph.choose("GEOMETRY", table.stands, turned, leaning)
 
 
 def _loose_parts_moved(

@@ -10,7 +10,7 @@ from ..nodes.node_graph import NodeGraph, Number
 from ..playback.weather_nodes import RAISED
 from .trampling_layout import META, THROWN_FROM, TILES, WIND
 
-_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NOWHERE = 1e9
 """More vertices than a table has: the last one is empty."""
 
@@ -72,10 +72,10 @@ def table_of(graph: NodeGraph, chosen: Any) -> Table:
     vertices, to_scatter = info.outputs["Geometry"], info.outputs["Transform"]
     inverted = graph.node("FunctionNodeInvertMatrix", {"Matrix": to_scatter}).outputs["Matrix"]
     origin = graph.node("FunctionNodeTransformPoint", {"Vector": (0.0, 0.0, 0.0), "Transform": inverted})
-    ways = [turned(graph, way, to_scatter) for way in _UNITS]
+    ways = [turned(graph, way, to_scatter) for way in UNITS]
     cell_up, each = ways[2], graph.math("DIVIDE", 1.0, graph.vector("LENGTH", ways[2], output="Value"))
     ways = [graph.scaled(way, each) for way in ways]
-    back = [graph.parts(turned(graph, way, inverted)) for way in _UNITS]
+    back = [graph.parts(turned(graph, way, inverted)) for way in UNITS]
     axes = [graph.combined(*(way[number].socket for way in back)) for number in (0, 1)]
     numbers = graph.attribute(META, "FLOAT_VECTOR")
     row, tile, frame_rate = graph.parts(graph.at_index(vertices, numbers, 0))

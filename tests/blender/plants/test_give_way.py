@@ -174,6 +174,26 @@ def test_roots_sink_with_the_ground_and_where_they_follow_it_they_do_not(shot, k
     np.testing.assert_allclose(blades(obj)[0][:, 2], 0.0, atol=1e-6)
 
 
+def test_a_tuft_lies_under_the_sole_with_all_of_its_blades(shot):
+    """Those that lean the other way, and those that grow beside its origin, too."""
+    place = roots(3)
+    tuft = scattered(place)
+    mesh = tuft.modifiers[0].node_group.nodes[-1].inputs["Object"].default_value.data
+    mesh.clear_geometry()
+    tips = np.array([(0.0, 0.2, 0.15), (0.0, -0.2, 0.15), (0.2, 0.0, 0.15), (0.02, 0.02, 0.3), (0.03, 0.03, 0.0)])
+    mesh.from_pydata([(0, 0, 0), *tips.tolist()], [(0, number) for number in range(1, 6)], [])
+    modifier = give_way(tuft)
+    set_input(modifier, "Height", HEIGHT)
+    table = tramplings(baked_ground.load(shot.softground.ground)[0])
+    number = table.latest(*place[:1, :2].T)[0]
+    go_to(shot, 0.5 * (table.by.start[number] + table.by.end[number]))
+    graph = bpy.context.evaluated_depsgraph_get()
+    lying = next(i.matrix_world.copy() for i in graph.object_instances if i.parent and i.parent.original == tuft)
+    ways = np.array([lying.to_3x3() @ Vector(tip) for tip in tips])
+    np.testing.assert_allclose(ways[:, 2], 0.0, atol=1e-4)
+    assert (ways[:4] @ (0.0, -1.0, 0.0) > tips[:4] @ (0.0, -1.0, 0.0) + 0.1).all()  # the walk goes there
+
+
 def test_roots_go_down_as_the_ground_does_while_soles_press_it(shot):
     grass = hair(roots(3000))
     give_way(grass)
