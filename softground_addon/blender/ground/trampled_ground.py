@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.plants.tramplings import Tramplings
 from ...core.settings import SceneUnits
-from ..plants import trampling_table, wind_nodes
+from ..plants import give_way, trampling_table, wind_nodes
 from ..playback import own_data
 from . import baked_ground, ground_mesh, ground_surface
 
@@ -19,6 +19,7 @@ def write(ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUni
         return
     trampling_table.write(table, ground, trampled, units)
     shown = baked_ground.display_mesh_of(ground)
+    give_way.follow(table, {shown})
     wind_nodes.follow(table, shown)
     if trampled is None:
         return

@@ -12,13 +12,15 @@ from ...core.plants.bending import PLANTS
 from .. import compat, mesh_arrays
 from ..nodes.node_modifiers import named_by_nodes, nodes_of, set_inputs
 from . import give_way_nodes as nodes
-from .trampling_table import modifier_of
+from .trampling_table import TRAMPLED_ON, modifier_of, plants_of
 
 MODIFIER = nodes.GROUP
 LITTER = {"LITTER": 0.0, "PEBBLES": 0.12}
 """Kinds of what lies on the ground, and how far they roll where it is hard [m]."""
 SCATTERS = ("MESH", "CURVES")
 """Types of objects that give way."""
+_BY_COPY = "softground_by_copy"
+"""Property of a table: True while a copy of its ground shows the prints."""
 _SHAPES = ("MESH", "CURVE", "CURVES", "SURFACE")
 _TALL = 95
 """Percentile of heights that is taken for that of the scatter: a few that are taller pass for grass that is moved."""
@@ -40,16 +42,33 @@ def put(
     grounds : collection of bpy.types.Object
         The objects that show the prints.
     """
+    follow(table, grounds)
     instances = _instances_of(objects)
     heights = [_height_of(obj, instances[obj]) for obj in objects]
     for obj, height in zip(objects, heights, strict=True):
         is_loose = obj.type == "MESH" and obj not in grounds and not instances[obj]
-        _put(obj, kind, table, height, follows=_follows(obj, grounds), is_loose=is_loose)
+        _put(obj, kind, table, height, is_loose=is_loose)
+        set_inputs(modifier_of(obj), _following(obj, grounds))
 
 
-def _put(
-    obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: float, *, follows: bool, is_loose: bool
-) -> None:
+def follow(table: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> None:
+    """Have plants sink or not, as they follow `grounds`, where a copy of the ground now shows the prints or no more."""
+    by_copy = table[TRAMPLED_ON] not in grounds
+    if table.get(_BY_COPY, False) == by_copy:
+        return
+    table[_BY_COPY] = by_copy
+    for obj in plants_of(table):
+        set_inputs(modifier_of(obj), _following(obj, grounds))
+        obj.update_tag()
+
+
+def _following(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> Mapping[str, Any]:
+    """Inputs that go by whether a scatter goes with the prints by itself."""
+    follows = _follows(obj, grounds)
+    return {"Sinks": not follows, "Surface": getattr(obj.data, "surface", None) if follows else None}
+
+
+def _put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: float, *, is_loose: bool) -> None:
     unit_scale = bpy.context.scene.unit_settings.scale_length
     modifier = modifier_of(obj)
     if modifier is None:
@@ -66,8 +85,6 @@ def _put(
         "Half After": plant.half_after,
         "Stands": kind not in LITTER,
         "Rolls": LITTER.get(kind, 0.0) / unit_scale,
-        "Sinks": not follows,
-        "Surface": getattr(obj.data, "surface", None) if follows else None,
         "Loose Parts": is_loose,
     }
     set_inputs(modifier, values)

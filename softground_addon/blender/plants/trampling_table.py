@@ -66,9 +66,8 @@ def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Trampling
         if trampled is not None:
             _fill(vertices, trampled, units)
     _exchange(table, vertices)
-    for obj in bpy.data.objects:
-        if obj.library is None and table in _tables_of(obj):
-            _play_anew(modifier_of(obj))
+    for obj in plants_of(table):
+        _play_anew(modifier_of(obj))
     if trampled is not None:
         side = trampled.cell_size / units.unit_scale_m
         origin = trampled.origin / units.unit_scale_m
@@ -95,6 +94,11 @@ def clear(ground: bpy.types.Object) -> None:
 def modifier_of(obj: bpy.types.Object) -> Any:
     """The modifier by which an object gives way, whatever its name has become; None without one."""
     return modifier_with(obj, nodes.is_give_way)
+
+
+def plants_of(table: bpy.types.Object) -> list[bpy.types.Object]:
+    """Objects of this file that give way by a table."""
+    return [obj for obj in bpy.data.objects if obj.library is None and table in _tables_of(obj)]
 
 
 def _play_anew(modifier: Any) -> None:

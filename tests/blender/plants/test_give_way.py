@@ -732,6 +732,30 @@ def test_the_scatter_of_a_terrain_gives_way_though_a_finer_copy_along_the_trail_
     assert not bake_report.stale_reasons(shot)
 
 
+def test_a_scatter_sinks_as_each_bake_shows_the_prints_unless_the_artist_says_otherwise(shot):
+    bpy.ops.softground.clear_bake()
+    terrain = shot.softground.ground = plane(shot, 6.0, 120)
+    grown_on(terrain)
+    modifier = give_way(terrain)
+
+    def sinks_after_a_bake(detail):
+        shot.softground.detail = detail
+        assert bpy.ops.softground.bake() == {"FINISHED"}
+        return compat.read_input(modifier, inputs_of(modifier)["Sinks"])
+
+    assert compat.read_input(modifier, inputs_of(modifier)["Sinks"]) is False
+    assert sinks_after_a_bake("ALWAYS") is True
+    assert baked_ground.display_mesh_of(terrain) != terrain
+    shot.frame_set(40)
+    graph = bpy.context.evaluated_depsgraph_get()
+    assert min(i.matrix_world.translation.z for i in graph.object_instances if i.is_instance) < -0.015
+    set_input(modifier, "Sinks", False)
+    assert sinks_after_a_bake("ALWAYS") is False
+    set_input(modifier, "Sinks", True)
+    bpy.ops.softground.clear_bake()
+    assert sinks_after_a_bake("NEVER") is False
+
+
 SKIN, DEEP, SHOE = 0.004, (0.012, 0.023, 1.0), 0.05
 """Depth from which on a blade is inside [m], a direction that meets no edge, and half of a shoe's thickness [m]."""
 
