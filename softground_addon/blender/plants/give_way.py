@@ -47,8 +47,7 @@ def put(
     heights = [_height_of(obj, instances[obj]) for obj in objects]
     for obj, height in zip(objects, heights, strict=True):
         is_loose = obj.type == "MESH" and obj not in grounds and not instances[obj]
-        _put(obj, kind, table, height, is_loose=is_loose)
-        set_inputs(modifier_of(obj), _following(obj, grounds))
+        _put(obj, kind, table, height, {"Loose Parts": is_loose, **_following(obj, grounds)})
 
 
 def follow(table: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> None:
@@ -68,7 +67,7 @@ def _following(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> 
     return {"Sinks": not follows, "Surface": getattr(obj.data, "surface", None) if follows else None}
 
 
-def _put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: float, *, is_loose: bool) -> None:
+def _put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: float, others: Mapping[str, Any]) -> None:
     unit_scale = bpy.context.scene.unit_settings.scale_length
     modifier = modifier_of(obj)
     if modifier is None:
@@ -76,7 +75,7 @@ def _put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: floa
         modifier.node_group = nodes.ensure_group()
         modifier.show_in_editmode = False
     plant = PLANTS.get(kind, PLANTS["MEADOW"])[1]
-    values: Mapping[str, Any] = {
+    values = {
         "Table": table,
         "Height": height or plant.height / unit_scale,
         "Stiffness": plant.stiffness,
@@ -85,7 +84,7 @@ def _put(obj: bpy.types.Object, kind: str, table: bpy.types.Object, height: floa
         "Half After": plant.half_after,
         "Stands": kind not in LITTER,
         "Rolls": LITTER.get(kind, 0.0) / unit_scale,
-        "Loose Parts": is_loose,
+        **others,
     }
     set_inputs(modifier, values)
     obj.update_tag()

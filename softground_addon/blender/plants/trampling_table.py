@@ -48,15 +48,11 @@ def is_current(ground: bpy.types.Object) -> bool:
 
 
 def is_idle(ground: bpy.types.Object) -> bool:
-    """True if a ground has a table and no plants that give way by it any more: it alone refers to the table, or nobody
-    to the group, which is told without a walk over all objects.
-
-    Blender 5.2 counts a removed modifier's table for good, but not its group.
-    """
+    """True if a ground has a table and no plants that give way by it any more, told without a walk over all objects.
+    Blender 5.2 counts a removed modifier's table for good, but not its group."""
     table = of(ground)
-    if table is None or table.users <= 1:
-        return table is not None
-    return not any(tree.users > tree.use_fake_user for tree in filter(nodes.is_give_way, bpy.data.node_groups))
+    groups = filter(nodes.is_give_way, bpy.data.node_groups)
+    return table is not None and (table.users <= 1 or all(tree.users <= tree.use_fake_user for tree in groups))
 
 
 def write(table: bpy.types.Object, ground: bpy.types.Object, trampled: Tramplings | None, units: SceneUnits) -> None:
@@ -80,7 +76,7 @@ def clear(ground: bpy.types.Object) -> None:
     table = of(ground)
     if table is None:
         return
-    if any(table in _tables_of(obj) for obj in bpy.data.objects):
+    if plants_of(table):
         table.modifiers.clear()
         table.animation_data_clear()
         _exchange(table, bpy.data.meshes.new(NAME))
@@ -98,7 +94,8 @@ def modifier_of(obj: bpy.types.Object) -> Any:
 
 def plants_of(table: bpy.types.Object) -> list[bpy.types.Object]:
     """Objects of this file that give way by a table."""
-    return [obj for obj in bpy.data.objects if obj.library is None and table in _tables_of(obj)]
+    of_file = ((obj, modifier_of(obj)) for obj in bpy.data.objects if obj.library is None)
+    return [obj for obj, modifier in of_file if modifier and table in dict(compat.node_inputs(modifier)).values()]
 
 
 def _play_anew(modifier: Any) -> None:
@@ -168,9 +165,3 @@ def _exchange(table: bpy.types.Object, vertices: bpy.types.Mesh) -> None:
     table.data = vertices
     if not old.users:
         bpy.data.meshes.remove(old)
-
-
-def _tables_of(obj: bpy.types.Object) -> list[Any]:
-    """Objects that are inputs of an object's modifier of ours."""
-    modifier = modifier_of(obj)
-    return [value for _, value in compat.node_inputs(modifier)] if modifier else []
