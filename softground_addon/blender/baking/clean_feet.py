@@ -21,15 +21,13 @@ from ...core.numerics.intervals import runs
 from ...core.record.ground_history import GroundHistory
 from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, resting, standing
 from ...core.response.response import at_scene_frames, gaps
-from ...core.settings import BakeSettings, CharacterSettings
-from .. import settings
+from ...core.settings import BakeSettings
 from ..animation_layer.constraint_layer import LayerKind
 from ..characters.character_setup import characters_of
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
 from ..response.character_keys import ReadRig
-from ..rigs.rest_pose import legs_of_feet, legs_on_shins
 from ..translation import translated
 
 EXACT = 0.1
@@ -83,10 +81,10 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
         raise InputError("No character here has feet to clean: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     assert wanted.response is not None
-    characters = tuple(_with_legs(moving) for moving in wanted.characters)
-    wanted = replace(wanted, response=replace(wanted.response, tilt=None), characters=characters)
+    wanted = replace(wanted, response=replace(wanted.response, tilt=None))
     response_job.check_characters(wanted.characters)
     shot = yield from read_shot(scene, wanted, LayerKind.CLEAN_FEET)
+    shot = replace(shot, motions=shot.responding)
     stood = standing_on.slices(shot.motions, shot.terrain, wanted.response)
     standing = yield from meanwhile(Progress("sample", 1.0), stood)
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
@@ -95,15 +93,6 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     response_job.put_layers(scene.softground, wanted, layers, LayerKind.CLEAN_FEET)
     yield Progress("write", 1.0)
     return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
-
-
-def _with_legs(character: CharacterSettings) -> CharacterSettings:
-    """A character with the legs of feet that hang elsewhere or are the ends of shins, where no leg of it is mapped."""
-    if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
-        return character
-    armature, soles = settings.resolve(character.armature), [sole.bone for sole in character.soles if sole.bone]
-    legs = legs_of_feet(armature, soles) or legs_on_shins(armature, soles)
-    return replace(character, joints={**character.joints, **legs})
 
 
 def _cleaned(

@@ -125,9 +125,9 @@ def shot_prints(wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit])
         settings.pop(key, None)
     of_each = list(zip(wanted.of_each_ground, shot.of_each_ground, strict=True))
     painted = [(part.variation, part.regions(each)) for each, part in of_each]  # the settings have the rest
-    skins = shot.skins if wanted.carves else {}
+    skins, legs = shot.skins if wanted.carves else {}, [rig.legs for rig in shot.rigs]
     pressing = _pressed(wanted, shot, stood, edits)
-    prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins), pressing)
+    prints = yield from reused(begun, "prints", (read, before, after, painted, edits, skins, legs), pressing)
     pairs = zip(prints.grounds, wanted.of_each_ground, strict=True)  # those before may write otherwise
     prints = replace(prints, grounds=tuple(replace(ground, made_with=each) for ground, each in pairs))
     # What is reported of them is held with them: nothing else has its identity meanwhile.
@@ -146,7 +146,7 @@ def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str
     at_end = Progress("simulate", 1.0)
     grounds = list(map(ground_of, wanted.of_each_ground, shot.of_each_ground))
     seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
-    pressing = press_shot(wanted, shot.motions, *stood, shot.terrain, grounds, edits, seen)
+    pressing = press_shot(wanted, shot.responding, *stood, shot.terrain, grounds, edits, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     prints: list[GroundPrints] = []
     for each in zip(wanted.of_each_ground, shot.of_each_ground, grounds, strict=True):

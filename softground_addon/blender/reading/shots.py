@@ -21,6 +21,7 @@ from ...core.ground.regions import Regions
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain, plane_of
 from ...core.ground.variation import PaintedSurface
+from ...core.legs.grounding import with_legs
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.ground_frame import GroundFrame
@@ -36,7 +37,7 @@ from ..ground import created_ground, ground_checks, ground_surface, painted_grou
 from ..ground.ground_surface import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..properties import setting_paths
-from ..response.character_keys import ReadRig, controls_of
+from ..response.character_keys import ReadRig, controls_of, mapping_with_legs
 from ..reuse import reused
 from ..rigs.rig_mapping import require_armature
 from ..sampling.body_sampling import sample_body
@@ -92,6 +93,12 @@ class Shot:
     def of_each_ground(self) -> tuple[Shot, ...]:
         """Its grounds, one by one."""
         return self.parts or (self,)
+
+    @property
+    def responding(self) -> tuple[CharacterMotion, ...]:
+        """The motions with all legs that can respond."""
+        legs = {rig.name: rig.legs for rig in self.rigs}
+        return tuple(with_legs(each, legs.get(each.name, {})) for each in self.motions)
 
     @property
     def skins(self) -> dict[str, WornSkin]:
@@ -288,8 +295,10 @@ def sample_characters(
             armature = settings.resolve(character.armature)
             if wanted.response:
                 check_rig(scene.objects, armature, mapping, character.mass_kg)
-                controls = controls_of(scene.view_layers[0], armature, mapping)
-                poses = RigPoses([control.bone for control in controls], with_skin=wanted.carves)
+                found = mapping_with_legs(character)
+                legs = {joint: bone for joint, (bone, _) in found.joints.items() if joint not in mapping.joints}
+                controls = controls_of(scene.view_layers[0], armature, found)
+                poses = RigPoses([*(control.bone for control in controls), *legs.values()], with_skin=wanted.carves)
             extent = extent_of(scene.unit_settings.scale_length, armature)
             grown = extent / character.size_m if character.size_m else 1.0
             job = sample_character(
@@ -316,5 +325,7 @@ def sample_characters(
         motion = yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))
         motions.append(replace(motion, ride=wanted.frame.ride) if wanted.frame else motion)
         if poses:
-            rigs.append(ReadRig(controls, poses))
+            ends = {joint: (poses.world @ poses.matrices[bone])[:, :3, 3] for joint, bone in legs.items()}
+            metres = {joint: wanted.unit_scale_m * end for joint, end in ends.items()}
+            rigs.append(ReadRig(motion.name, controls, poses, metres))
     return motions, tuple(rigs)

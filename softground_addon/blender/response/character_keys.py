@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ...core.legs.grounding import Response
 from ...core.motion.motion import CharacterMotion
+from ...core.motion.people import leg_sides
 from ...core.numerics.arrays import Array
 from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import quaternions
 from ...core.numerics.rigid import carried
 from ...core.rig.mapping import RigMapping
-from ...core.settings import ObjectName
+from ...core.settings import CharacterSettings, ObjectName
 from ..animation_layer.layer_curves import LayerCurve, path_of_bone
+from ..rigs.rest_pose import legs_of_feet, legs_on_shins
 from ..sampling.rig_checks import check_bones
 from ..sampling.rig_sampling import RigPoses
 from ..settings import resolve
@@ -28,12 +30,46 @@ LENGTH_TOLERANCE = 2e-4
 """The same for places [m]."""
 
 
+_LEG = ("hip", "knee", "ankle")
+
+
 @dataclass(frozen=True)
 class ReadRig:
-    """A rig as it was read: the bones that a response is keyed on, and their poses by the user's animation alone."""
+    """A rig as it was read: the bones that a response is keyed on, and their poses by the user's animation alone.
 
+    Attributes
+    ----------
+    legs : dict of str to (F, 3) float array
+        Joints of legs that nothing else knows: loads go without them [m].
+    """
+
+    name: str
     controls: list[Control]
     poses: RigPoses
+    legs: dict[str, Array]
+
+
+def mapping_with_legs(character: CharacterSettings) -> RigMapping:
+    """The mapping of a character with further legs: those of feet that hang elsewhere, arms that stand on the ground
+    and, where there is no leg at all, those whose shins are their feet."""
+    mapping, joints = RigMapping(character.joints, character.soles, "settings"), dict(character.joints)
+    assert character.armature
+    armature, known = resolve(character.armature), leg_sides(joints)
+    stands = {bone: _with_parents(armature, bone) for sole in mapping.soles if (bone := sole.bone)}
+    ankles = {joints[f"ankle_{side}"][0] for side in known if f"ankle_{side}" in joints}
+    others = [bone for bone, chain in stands.items() if ankles.isdisjoint(chain)]
+    legs = legs_of_feet(armature, others) or ({} if known else legs_on_shins(armature, others))
+    arms = [[f"{joint}_{side}" for joint in ("shoulder", "elbow", "wrist")] for side in "lr"]
+    feet = {bone for sole in mapping.soles if not sole.limb for bone in stands.get(sole.bone, ())}
+    if not legs and all({*arm} <= joints.keys() and joints[arm[2]][0] in feet for arm in arms):
+        legs = {f"{leg}_{arm[0][-1]}": joints[of] for arm in arms for leg, of in zip(_LEG, arm, strict=True)}
+    further = "2" if known else ""
+    return replace(mapping, joints={**joints, **{f"{joint}{further}": bone for joint, bone in legs.items()}})
+
+
+def _with_parents(armature: bpy.types.Object, bone: str) -> set[str]:
+    found = armature.data.bones.get(bone)
+    return {bone, *(parent.name for parent in found.parent_recursive)} if found else {bone}
 
 
 def response_curves(

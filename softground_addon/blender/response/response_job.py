@@ -14,7 +14,6 @@ from ...core.composers.responses import CharacterResponse, worst_gaps
 from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.response.performance import suggested_speed
-from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings
 from .. import settings
 from ..animation_layer.constraint_layer import (
@@ -28,7 +27,7 @@ from ..animation_layer.constraint_layer import (
 from ..animation_layer.layer_curves import LayerCurve
 from ..jobs import Job, counted
 from ..placement import world_matrix
-from .character_keys import ReadRig, controls_of, response_curves
+from .character_keys import ReadRig, controls_of, mapping_with_legs, response_curves
 
 ROUNDED = 2e-3
 """Rounding of places from which feet would jump about, in units of the armature."""
@@ -67,7 +66,7 @@ def _refusal(view_layer: bpy.types.ViewLayer, characters: Sequence[CharacterSett
     try:
         check_characters(characters)
         for character, armature in rigged(characters):
-            controls_of(view_layer, armature, RigMapping(character.joints, character.soles, "settings"))
+            controls_of(view_layer, armature, mapping_with_legs(character))
     except InputError as error:
         return str(error)
     return ""

@@ -13,6 +13,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
+from ...core.motion.people import leg_sides
 from ...core.rig.mapping import RigMapping
 from ..animation_layer.constraint_layer import is_own
 from ..animation_layer.layer_curves import animated_paths
@@ -64,7 +65,7 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     body = _body_control(rig, mapping)
     parts = {body: BODY}
     chosen: list[tuple[str, str, bool]] = [(body, BODY, True)]
-    for side in "lr":
+    for side in dict.fromkeys(("l", "r", *leg_sides(mapping.joints))):
         named = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
         names = named if named[2] else named[:2]
         if all(names) and len(set(names)) == len(names):
@@ -76,6 +77,11 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
         if arm and arm not in parts:
             chosen.append((arm, f"arm_{side}", False))
             parts[arm] = f"arm_{side}"
+    trunk = {*rig.behind(body)}
+    chains = [[*rig.behind(sole.bone)] for sole in mapping.soles if sole.bone]
+    apart = [[bone for bone in chain if bone not in trunk] for chain in chains if parts.keys().isdisjoint(chain)]
+    chosen += [(bone, BODY, True) for bone in dict.fromkeys(chain[-1] for chain in apart if chain) if rig.is_free(bone)]
+    parts |= {bone: part for bone, part, _ in chosen}
     controls = []
     for bone, part, moves in chosen:
         above = (ancestor for ancestor in rig.behind(bone) if ancestor != bone and ancestor in parts)
@@ -97,7 +103,8 @@ def travelling_bone(armature: bpy.types.Object, evaluated: bpy.types.Object, map
 def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     """The nearest bone behind the hips that also carries both thighs and the head, and that can be moved."""
     joints = mapping.joints
-    carried = [joints[joint][0] for joint in ("hips", "hip_l", "hip_r", "head", "neck", "spine") if joint in joints]
+    hip_joints = [joint for joint in joints if joint.startswith("hip")]
+    carried = [joints[joint][0] for joint in (*hip_joints, "head", "neck", "spine") if joint in joints]
     if not carried:
         carried = [source.bone for source in mapping.soles if source.bone]
     if not carried:

@@ -122,7 +122,7 @@ def map_by_rest_pose(
 
 
 def legs_of_feet(armature: bpy.types.Object, feet: Sequence[str]) -> Joints:
-    """Hips, knees and ankles of the hindmost feet that hang elsewhere than on their shins; empty if there are none.
+    """Hips, knees and ankles of feet that hang elsewhere than on their shins; empty if there are none.
 
     In game rigs whose IK was baked, feet hang on the root. The shin of such a foot is the end of another chain that is
     nearest to it; both feet of a pair, with their shins and thighs, are mirror images.
@@ -139,12 +139,12 @@ def legs_of_feet(armature: bpy.types.Object, feet: Sequence[str]) -> Joints:
         if (np.diff(skeleton.heads[leg, 2]) < 0).all():
             legs.append(leg)
     pairs = [(leg, other) for leg, other in combinations(legs, 2) if _are_mirrored(skeleton, leg, other)]
-    return _hindmost(skeleton, pairs, ("hip", "knee", "ankle"))
+    return _joints_of(skeleton, pairs, ("hip", "knee", "ankle"))
 
 
 def legs_on_shins(armature: bpy.types.Object, soles: Sequence[str]) -> Joints:
-    """Hips and knees of the hindmost legs that stand on the ends of their shins, as of figures made of blocks; empty if
-    there are none.
+    """Hips and knees of legs that stand on the ends of their shins, as of figures made of blocks; empty if there are
+    none.
 
     Such a leg is the last two bones below where it parts from its mirror image; where arms are too, legs begin lower.
     """
@@ -157,22 +157,26 @@ def legs_on_shins(armature: bpy.types.Object, soles: Sequence[str]) -> Joints:
             if len(leg_chain) - fork == 2 and _are_mirrored(skeleton, leg_chain[fork:], other[fork:]):
                 pairs.append((leg_chain[fork:], other[fork:]))
     level = min((float(skeleton.heads[leg[0], 2]) for leg, _ in pairs), default=0.0) + _LOW * skeleton.height
-    return _hindmost(skeleton, [pair for pair in pairs if skeleton.heads[pair[0][0], 2] <= level], ("hip", "knee"))
+    return _joints_of(skeleton, [pair for pair in pairs if skeleton.heads[pair[0][0], 2] <= level], ("hip", "knee"))
 
 
-def _hindmost(skeleton: _Skeleton, pairs: Sequence[_Pair], joints: Sequence[str]) -> Joints:
-    """The joints at which the bones of the hindmost pair of legs begin; empty if there is none."""
+def _joints_of(skeleton: _Skeleton, pairs: Sequence[_Pair], joints: Sequence[str]) -> Joints:
+    """The joints at which the bones of pairs of legs begin, the hindmost first: `leg_sides`."""
     if not pairs:
         return {}
     forward = _forward(skeleton, pairs)
     left = np.cross((0.0, 0.0, 1.0), forward)
-    hindmost = min(pairs, key=lambda pair: float(skeleton.heads[pair[0][0]] @ forward))
-    sides = sorted(hindmost, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left))
-    return {
-        f"{joint}_{side}": (skeleton.names[bone], "head")
-        for side, leg in zip("lr", sides, strict=True)
-        for joint, bone in zip(joints, leg, strict=True)
-    }
+    found: Joints = {}
+    number, taken = 1, set[int]()
+    for pair in sorted(pairs, key=lambda pair: float(skeleton.heads[pair[0][0]] @ forward)):
+        if taken & {*pair[0], *pair[1]}:
+            continue
+        taken |= {*pair[0], *pair[1]}
+        for side, leg in zip("lr", sorted(pair, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left)), strict=True):
+            named = (f"{joint}_{side}{number if number > 1 else ''}" for joint in joints)
+            found |= {joint: (skeleton.names[bone], "head") for joint, bone in zip(named, leg, strict=True)}
+        number += 1
+    return found
 
 
 def _highest_alone(path: Sequence[int], paths: Sequence[Sequence[int]]) -> int | None:

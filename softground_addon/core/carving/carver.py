@@ -39,9 +39,9 @@ SAMPLES = 2
 """Quarters along each side of a cell."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
-THICKEST, HIGHEST, LAYERS = 0.04, 0.08, 3
+THICKEST, LAYERS = 0.04, 3
 """Loose matter is laid up to a thickness [m], and under what hovers over it, in so many goes; then up to twice that;
-then anywhere."""
+then as high as what is cut is deep, ..."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 EDGE, LEAST_DROP = 0.06, 0.06
@@ -52,6 +52,9 @@ MOST_OF_DROP = 0.7
 """Part of a drop that breaks off at most."""
 REACH = 0.04
 """How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
+HIGHEST = 2 * THICKEST
+NEARBY = (REACH, THICKEST), (REACH, HIGHEST)
+"""... and twice as far around, as large bodies leave no room near them; then evenly on all that is looked at."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,9 @@ class Walls:
         """
         rows, columns = (np.minimum(np.arange(count), np.arange(count)[::-1]) for count in change.shape)
         falls = loose + np.maximum(np.ptp(change) - self.strength, 0.0)
-        spread = np.minimum(falls, np.ptp(change)) / (tan(self.repose) * cell_size)
+        volume = float((loose + np.abs(change - loose)).sum()) * cell_size**2
+        heap = (3.0 / np.pi * tan(self.repose) ** 2 * volume) ** (1 / 3)  # height of a cone that holds all of it
+        spread = np.minimum(falls, min(heap, np.ptp(change))) / (tan(self.repose) * cell_size)
         return max(ceil((spread - np.minimum(rows[:, None], columns)).max()), 0) + 1
 
 
@@ -223,10 +228,14 @@ class CarvedCells:
 
     def _lay(self, thrown: Array, way: Array, bodies: Array) -> None:
         """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
-        laid = _around(thrown, way, self.cell_size) * ~(self.closed | self.contact)
+        closed = self.closed | self.contact
         highest = bodies - self._standing_cells.max(axis=0) - TOLERANCE
         remaining = float(thrown.sum())
-        for thickest in (THICKEST, HIGHEST, np.inf):
+        pit = float((self.terrain - self.standing).max())
+        for reach, thickest in (*NEARBY, (REACH, pit), (2 * REACH, pit), (0.0, np.inf)):
+            if remaining <= ROUNDING:
+                break
+            laid = (_around(thrown, way, max(round(reach / self.cell_size), 1)) if reach else 1.0) * ~closed
             room = np.maximum(np.minimum(highest, thickest) - self.loose, 0.0)
             for _ in range(LAYERS):
                 share = laid * (room > 0)
@@ -370,9 +379,9 @@ def _middle(quarters: Array) -> Array:
     return np.asarray((low + high) / 2)
 
 
-def _around(thrown: Array, way: Array, cell_size: float) -> Array:
-    """Heights (rows, columns) laid around where they are, and as many ahead along a way (2,)."""
-    reach, length = max(round(REACH / cell_size), 1), float(np.hypot(*way))
+def _around(thrown: Array, way: Array, reach: int) -> Array:
+    """Heights (rows, columns) laid so many cells around where they are, and as many ahead along a way (2,)."""
+    length = float(np.hypot(*way))
     ahead = np.rint(way[::-1] / length * reach).astype(int) if length > 0 else np.zeros(2, int)
     over_rows, over_columns = (_smoothing(count, reach | 1) for count in thrown.shape)
     laid = over_rows @ thrown @ over_columns
@@ -388,7 +397,7 @@ def _around(thrown: Array, way: Array, cell_size: float) -> Array:
     return np.where(laid > THINNEST * laid.max(), laid, 0.0)
 
 
-@lru_cache(8)
+@lru_cache(16)
 def _smoothing(count: int, width: int) -> Array:
     """The matrix (count, count) that takes means over an odd number of cells twice; nothing is beyond the edges."""
     away = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..motion.motion import CharacterMotion
+from ..motion.people import leg_sides
 from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array, Mask
 from ..numerics.orientation import rotation_vectors
@@ -67,7 +68,7 @@ class Response:
     body : (F, 4, 4) float array
         Of hips, trunk, head and arms.
     legs : mapping of str to LegResponse
-        By side, "l" and "r".
+        By side: "l" and "r", of further pairs "l2" and "r2".
     lean : (F, 2) float array
         Angle that the body leans toward +x and +y [rad].
     arms : mapping of str to (F, 4, 4) float array
@@ -94,9 +95,7 @@ def leg_soles(motion: CharacterMotion) -> dict[str, int]:
     piece.
     """
     by_side: dict[str, int] = {}
-    for side in "lr":
-        if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee")):
-            continue
+    for side in leg_sides(motion.joints):
         worn = [index for index, sole in enumerate(motion.soles) if _goes_with(motion, sole, side)]
         if worn:
             by_side[side] = min(worn, key=lambda index: float(motion.soles[index].landmark_positions()[..., 2].mean()))
@@ -351,16 +350,28 @@ def with_sole(motion: CharacterMotion, number: int, sole: SoleMotion) -> Charact
     return dataclasses.replace(motion, soles=soles)
 
 
+def with_legs(motion: CharacterMotion, joints: Mapping[str, Array]) -> CharacterMotion:
+    """The motion with the joints (F, 3) of further legs; where these are all its legs, it is as large as they are."""
+    known, legs = leg_sides(motion.joints), dataclasses.replace(motion, joints={**motion.joints, **joints})
+    lengths = [leg_of(legs, side, sole).length.mean() for side, sole in leg_soles(legs).items()]
+    return legs if known or not lengths else dataclasses.replace(legs, leg_length=float(np.mean(lengths)))
+
+
 def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
     """True if a sole is the foot of a side, or worn on it such as a snowshoe."""
-    if sole.sole.side.lower() not in (side, ""):
+    if sole.sole.side.lower() not in (side[0], ""):
         return False
     return (_is_on_ankle if has_ankle(motion, side) else _is_end_of_shank)(motion, sole, side)
 
 
 def _is_on_ankle(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
-    """True if a sole is near the ankle of a side, or moves with it."""
-    distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
+    """True if a sole is near the ankle of a side and no other is nearer, or moves with it."""
+    middle = sole.landmark_positions().mean(axis=1)
+    ankles = [motion.joints[f"ankle_{leg}"] for leg in leg_sides(motion.joints) if f"ankle_{leg}" in motion.joints]
+    nearest = min(float(np.linalg.norm(middle - ankle, axis=-1).mean()) for ankle in ankles)
+    distance = np.linalg.norm(middle - motion.joints[f"ankle_{side}"], axis=-1)
+    if not sole.sole.side and distance.mean() > nearest:
+        return False
     is_near = float(distance.mean()) <= ON_THE_ANKLE * motion.leg_length
     is_rigid = float(np.ptp(distance)) < RIGID * motion.leg_length
     if not sole.sole.side:
@@ -369,10 +380,10 @@ def _is_on_ankle(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
 
 
 def _is_end_of_shank(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
-    """True if a sole keeps its place as seen from the knee, as far from it as the end of a shank is, and the other knee
-    is not nearer."""
+    """True if a sole keeps its place as seen from the knee, as far from it as the end of a shank is, and no other knee
+    is nearer."""
     middle = sole.landmark_positions().mean(axis=1)
-    knees = [motion.joints[knee] for knee in (f"knee_{side}", "knee_l", "knee_r") if knee in motion.joints]
+    knees = [motion.joints[f"knee_{leg}"] for leg in (side, *leg_sides(motion.joints))]
     this, *both = (np.linalg.norm(middle - knee, axis=-1) for knee in knees)
     thigh = float(np.linalg.norm(knees[0] - motion.joints[f"hip_{side}"], axis=-1).mean())
     is_rigid, is_shank = float(np.ptp(this)) < ONE_PIECE * motion.leg_length, float(this.mean()) > SHORT_SHANK * thigh

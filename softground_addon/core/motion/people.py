@@ -17,6 +17,11 @@ MASS_RANGE = 4.0
 _LEGS = frozenset(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in "lr")
 
 
+def leg_sides(joints: Collection[str]) -> list[str]:
+    """Sides of the legs whose hip and knee are known: "l" and "r", of further pairs toward the head "l2", "r2"."""
+    return [joint[4:] for joint in joints if joint.startswith("hip_") and f"knee_{joint[4:]}" in joints]
+
+
 def has_two_legs(joints: Collection[str], legs: int) -> bool:
     """True for joints of two legs, if a body has no more that print."""
     return _LEGS.issubset(joints) and legs == 2

@@ -4,31 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..ground.heightfield import Terrain
 from ..legs.foot_lock import lock, moved, slides, travelling, underside_on
-from ..legs.foot_placement import Placement, between_contacts, place_sole
-from ..legs.grounding import Response, has_ankle, leg_of, leg_soles, stand, with_sole
+from ..legs.foot_placement import Placement, place_sole
+from ..legs.grounding import Response, leg_soles, stand, with_sole
+from ..legs.one_piece import put_in_place
 from ..legs.sole_rim import posed_rim
 from ..loads.contacts import REST_SPEED
 from ..motion.motion import CharacterMotion
 from ..numerics.arrays import Array, Mask
 from ..numerics.intervals import runs
-from ..numerics.orientation import rotation_vectors
-from ..numerics.rigid import carried, displacement, rotation
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
-ONE_PIECE_PASSES = 32
-"""Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
-stand on other points. Each begins midway between where the last began and ended, as points take turns at bearing."""
-IN_PLACE = 3e-4
-"""Feet that move less than this from one time to the next are where they belong, in leg lengths."""
 
 RESTING = 0.5
 """Toes rest that are slower than this part of the body that goes on over them."""
@@ -125,35 +120,8 @@ def clean(
     """
     if stands is None:
         stands = yield from standing.slices(motion, touching, terrain, holds)
-    response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, {})
-    soles = {side: sole for side, sole in leg_soles(motion).items() if not has_ankle(motion, side)}
-    touches = {side: touching[:, sole] for side, sole in soles.items() if touching[:, sole].any()}
-    middles = {side: leg_of(motion, side, soles[side]).ankle for side in touches}
-    so_far = {side: _eased(touches[side], middles[side], response.legs[side].foot) for side in touches}
-    settled, least = response, np.inf
-    for _ in range(ONE_PIECE_PASSES if touches else 0):
-        response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
-        moves = [
-            (carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]))[touches[side]]
-            for side in touches
-        ]
-        largest = max(float(np.abs(move).max()) for move in moves)
-        settled, least = (response, largest) if largest < least else (settled, least)
-        if largest < IN_PLACE * motion.leg_length:
-            break
-        so_far = {
-            side: _eased(touches[side], middles[side], so_far[side], response.legs[side].foot) for side in touches
-        }
-    return settled
-
-
-def _eased(touching: Mask, middle: Array, *carries: Array) -> Array:
-    """The mean of displacements (F, 4, 4) of a foot with its middle at (F, 3) in its contacts, passing smoothly between
-    them."""
-    turns = np.mean([rotation_vectors(carry[:, :3, :3]) for carry in carries], axis=0)
-    moves = np.mean([carried(carry, middle) - middle for carry in carries], axis=0)
-    turns, moves = between_contacts(turns, touching), between_contacts(moves, touching)
-    return displacement(rotation(turns), middle, middle + moves)
+    solve = partial(_cleaned.slices, motion, touching, terrain, holds, stands)
+    return (yield from put_in_place.slices(motion, touching, solve))
 
 
 @sliced

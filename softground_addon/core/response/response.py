@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,8 @@ from ..ground.hard_ground import through
 from ..ground.heightfield import FlatTerrain, Terrain
 from ..legs.foot_lock import moved
 from ..legs.foot_placement import Placement, lowest_clearance, place_sole, posed_points
-from ..legs.grounding import Response, heel_rises, leg_of, leg_soles, responding, settle, with_sole
+from ..legs.grounding import Response, has_ankle, heel_rises, leg_of, leg_soles, responding, settle, with_sole
+from ..legs.one_piece import put_in_place
 from ..legs.wading import DEPTH_TIME, body_depth
 from ..loads.contacts import Contacts, detect_contacts
 from ..motion.motion import CharacterMotion
@@ -20,6 +22,7 @@ from ..motion.sole_motion import SoleMotion
 from ..numerics.arrays import Array, Mask
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
+from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
@@ -116,36 +119,55 @@ def respond(
     followed : Followed, optional
         Where moved steps take the feet; only with grounding.
     """
-    undisturbed = GroundHistory(history.terrain)
-    feet = leg_soles(motion)
     leaning = np.zeros((len(motion.frames), 2))
     if tilt is not None:
         leaning = tilt.strength * _lean(motion, touching, history, tilt)
         yield
     if grounding is None:
-        unmoved = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
+        unmoved = {side: (sole, _unmoved(len(motion.frames))) for side, sole in leg_soles(motion).items()}
         in_place = np.ones_like(touching)  # feet stay where they are, in swings too
         return (yield from settle.slices(motion, unmoved, in_place, leaning))
 
     followed = followed or Followed()
     standing = touching if standing is None else standing
+    solve = partial(_grounded.slices, motion, standing, history, leaning, grounding, followed)
+    return (yield from put_in_place.slices(motion, standing, solve))
+
+
+@sliced
+def _grounded(
+    motion: CharacterMotion,
+    standing: Mask,
+    history: GroundHistory,
+    leaning: Array,
+    grounding: GroundingOptions,
+    followed: Followed,
+    so_far: Mapping[str, Array],
+) -> Slices[Response]:
+    """See `respond`; feet start from where they are so far, (F, 4, 4) by side, or from the source."""
+    undisturbed, feet = GroundHistory(history.terrain), leg_soles(motion)
+    carries = {**followed.carries, **{feet[side]: carry for side, carry in so_far.items()}}
 
     def place(side: str, heel_rise: Array | None = None, change: Array | None = None) -> Slices[None]:
         yield
         sole = feet[side]
-        carry = followed.carries.get(sole)
+        carry = carries.get(sole)
         placed = place_sole(
             motion if carry is None else with_sole(motion, sole, moved(motion.soles[sole], carry)),
             sole,
             standing[:, sole],
             history,
             undisturbed,
-            align=grounding.align,
+            align=grounding.align if has_ankle(motion, side) else 0.0,
             lock=grounding.lock,
             heel_rise=heel_rise,
             change=change,
         )
-        placements[side] = sole, placed if carry is None else replace(placed, carry=placed.carry @ carry)
+        if carry is not None:
+            middle = motion.soles[sole].landmark_positions().mean(axis=1)
+            lift = placed.lift + (carried(carry, middle) - middle)[:, 2]
+            placed = replace(placed, carry=placed.carry @ carry, lift=lift)
+        placements[side] = sole, placed
 
     placements: dict[str, tuple[int, Placement]] = {}
     for side in feet:

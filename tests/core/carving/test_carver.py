@@ -64,6 +64,24 @@ def test_what_is_cut_goes_ahead_of_the_body():
     assert middle_column > 31.0
 
 
+def test_what_a_wide_body_cuts_is_laid_beyond_it_and_towers_nowhere():
+    """A belly that hovers all around a leg leaves one cell of room beside it: all of it came to lie there."""
+    cells, leg = level(), block(level(), (25, 25), (35, 35), -0.05)
+    bodies = np.minimum(leg, block(cells, (17, 17), (43, 43), 0.0))[0]
+    bodies[24, 30] = np.inf
+    cells.cut(leg, NOBODY, 0.0, bodies)
+    assert cells.loose.sum() == pytest.approx(10 * 10 * 0.05, rel=1e-12)
+    assert cells.loose.max() < 0.09, "no higher than beside a leg alone"
+    assert walls_of("snow").reach(cells.surface, cells.loose, CELL) < 20
+
+
+def test_what_slides_off_a_spike_comes_no_farther_than_a_heap_of_it_does():
+    loose = np.zeros((40, 40))
+    loose[20, 20] = 11.0
+    heap = np.cbrt(3 * 11.0 * CELL**2 / (np.pi * np.tan(walls_of("sand").repose)))
+    assert walls_of("sand").reach(loose, loose, CELL) <= np.ceil(heap / CELL) + 1
+
+
 def test_nothing_is_laid_higher_than_what_hovers_over_it():
     cells = level()
     over = block(cells, (0, 0), (60, 60), 0.05)
