@@ -27,6 +27,8 @@ SHORTEST = 0.04
 """Time over which skin is seen to move [s]."""
 RESTS = 0.25
 """Skin that rests as long wants a print within reach, also where it is of no contact, or others touch [s]."""
+MOST_NAMED = 8
+"""Feet that a message names at most."""
 TOGETHER = 0.5
 """Share of the rarer one's time for which two contacts of one foot both touch, and of their breadth within which."""
 
@@ -62,6 +64,9 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         bears = np.where(touching.any(axis=1), max(RESTS * slow, LEAST_FRAMES), longest)  # or it brushes the ground
         idle |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
+        bears = motion.soles[number].bears
+        if bears is not None and name not in aloft:  # it lands before its skin does, or leaves after it
+            aloft |= _first(name, on & ~bears[motion.on_frames], longest)
     least = max(RESTS * slow, LEAST_FRAMES)
     lengths = [sole.sole.length for sole in motion.soles]
     marks = [sole.landmark_positions()[motion.on_frames, :, :2] for sole in motion.soles]
@@ -81,7 +86,7 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
     ):
         if parts:
             first = skin.frames[min(parts.values())]
-            message = f"{kind}{listed(parts)} of '{motion.name}' {what}, from frame {first:.0f} on"
+            message = f"{kind}{listed(parts, MOST_NAMED)} of '{motion.name}' {what}, from frame {first:.0f} on"
             findings.append(Finding(code, "warning", message, remedy, {"character": motion.name, "parts": [*parts]}))
     return findings
 

@@ -125,6 +125,12 @@ def test_every_foot_of_a_skeleton_without_a_skin_prints_when_it_stands(addon, se
     assert not seen(Animal.drawn(seed), skinned=False).wrong
 
 
+@pytest.mark.parametrize("seed", [7029, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7032, 8056, 8161))])
+def test_the_self_check_names_the_feet_of_those_that_run_and_lift_them_slowly(addon, seed):
+    """Large ones at 48 to 60 frames a second, whose contacts are 7 to 20 frames too long by the speed of their feet."""
+    assert seen(Animal.drawn(seed)).named
+
+
 @pytest.mark.parametrize("seed", [1016, 1032, 1056])
 def test_the_self_check_names_a_contact_that_is_absent_late_early_or_double(addon, seed):
     animal = seen(Animal.drawn(seed))

@@ -125,6 +125,17 @@ def test_each_contact_is_judged_by_its_own_skin_and_named():
     assert "'left' of" in findings_of(over)["step_without_skin"].message
 
 
+@pytest.mark.parametrize(("late", "named_ones"), [(0.05, ""), (0.15, "'right' of 'walker' prints while its skin is")])
+def test_a_contact_that_outlasts_its_skin_is_named(late, named_ones):
+    loads = named(stands(), ("foot.L", "foot.R"), ("left", "right"))
+    left, right = loads.motion.soles
+    bears = np.arange(len(loads.motion.frames)) * loads.motion.time_step > late
+    late_ones = replace(loads, motion=replace(loads.motion, soles=(left, replace(right, bears=bears))))
+    said = findings_of(late_ones)
+    assert said.keys() == ({"step_without_skin"} if named_ones else set())
+    assert named_ones in "".join(finding.message for finding in said.values())
+
+
 def test_feet_that_slide_or_swing_low_want_no_print_of_their_own():
     loads = named(stands(), ("foot.L", "foot.R"), ("left", "right"))
     touching = loads.contacts.touching.copy()
