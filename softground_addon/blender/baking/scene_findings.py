@@ -22,6 +22,7 @@ from ..plants import give_way_nodes, trampling_table
 from ..reading import staleness
 from ..reading.shots import Shot
 from ..rigs.frame_ranges import ancestors, playing_tracks
+from ..rigs.worn_rigs import rigs_below
 from ..sampling.body_sampling import deforms, meshes_of
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.sampling_scene import object_named
@@ -53,6 +54,7 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
         *_followed_shapes(wanted),
         *_crowds(scene, wanted),
         *_unseen_ground(scene, wanted),
+        *_rigs_below(scene, wanted),
         *_edited_plants(),
         *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
@@ -240,3 +242,12 @@ def _unseen_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Fin
             f"Ground '{ground.name}' is not in scene '{scene.name}', where its prints are not seen",
             "link it there (Object > Link/Transfer Data > Link Objects to Scene), or choose another one.",
         )
+
+
+def _rigs_below(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+    """Rigs that nobody added under a character that was."""
+    bodies = [settings.resolve(character.armature) for character in wanted.characters if character.armature]
+    for body in bodies:
+        if names := [rig.name for rig in rigs_below(scene.objects, body) if rig not in bodies]:
+            said = f"{listed(names)} stands under '{body.name}' and is no character: its feet do not print"
+            yield Finding("rig_below", "warning", said, "add it, or join the two rigs of one body (Ctrl J).")

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.numerics.arrays import Array
 from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
@@ -20,6 +21,9 @@ _COPIES = {"COPY_TRANSFORMS", "COPY_LOCATION"}
 _HOLDS = _COPIES | {"CHILD_OF", "ARMATURE"}
 """Constraints by which a bone goes where another one goes, and those by which it lies as that lies."""
 
+LOWER = 0.2
+"""A rig is below a body if it reaches lower by so much of its height."""
+
 _FULL = 0.5
 """Least influence of a constraint that counts."""
 
@@ -27,6 +31,25 @@ _FULL = 0.5
 def worn_rigs(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object]:
     """The armatures that a body wears: they hang on its bones, or have no keys and go where its bones go."""
     return [obj for obj in objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
+
+
+def rigs_below(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object]:
+    """The armatures with a skin that stand under a body as it is now and move by themselves: legs with a rig of their
+    own, a horse."""
+    (low, high), worn = _extent(body), [rig for rig in worn_rigs(objects, body) if not rig.animation_data]
+    skinned = dict.fromkeys(rig for obj in objects if obj.type == "MESH" and (rig := obj.find_armature()))
+    return [rig for rig in skinned if rig not in (body, *worn) and _is_below(_extent(rig), low, high)]
+
+
+def _is_below(extent: Array, low: Array, high: Array) -> bool:
+    meets = (extent[0, :2] < high[:2]).all() and (extent[1, :2] > low[:2]).all()
+    return bool(meets and low[2] - extent[0, 2] > LOWER * (high[2] - low[2]))
+
+
+def _extent(rig: bpy.types.Object) -> Array:
+    """Lowest and highest corner of a rig's bones in the world, (2, 3)."""
+    ends = np.array([np.array(rig.matrix_world @ end) for bone in rig.pose.bones for end in (bone.head, bone.tail)])
+    return np.stack([ends.min(axis=0), ends.max(axis=0)]) if len(ends) else np.zeros((2, 3))
 
 
 def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> Carried | None:

@@ -30,14 +30,17 @@ _LEAST_WEIGHT = 1e-4
 """Weights that come to less leave a vertex where its object is, as in Blender's armature deformation."""
 
 
+_STAND_INS = ("WIRE", "BOUNDS")
+
+
 def meshes_on(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
 
-    With those of rigs that it wears, if it has any by itself. Beside rendered ones, those that are not are mostly
-    stand-ins.
+    With those of rigs that it wears, if it has any by itself. Beside rendered ones, those that are not, or that are
+    shown as wires or bounds, are mostly stand-ins: collision shapes.
     """
     worn = _worn_by(objects, armature)
-    return [obj for obj in worn if not obj.hide_render] or worn
+    return [obj for obj in worn if not obj.hide_render and obj.display_type not in _STAND_INS] or worn
 
 
 def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:

@@ -35,8 +35,9 @@ ADULT_LEG = 0.9
 JUMP = 0.25
 """A body that moves farther between two frames may jump, in leg lengths, ..."""
 
-JUMPS_AHEAD = 6.0
-"""... if that is so many times as far as between any other two frames nearby, ..."""
+JUMPS_AHEAD = 4.0
+"""... if that is so many times as far as between any other two frames nearby (1.6 in clips that do not; five frames of
+a walk that are cut come to five), ..."""
 
 AROUND_JUMP = 0.25
 """... as long before and after: keys on threes at 12 frames a second are poses that are held, each [s]."""

@@ -56,12 +56,13 @@ def test_a_hidden_body_beside_what_is_rendered_is_named(walk):
     assert f"'{body.name}', which covers them, is hidden from renders" in said
 
 
-def test_a_stand_in_that_is_not_rendered_does_not_print(walk):
+@pytest.mark.parametrize(("how", "to"), [("hide_render", True), ("display_type", "WIRE"), ("display_type", "BOUNDS")])
+def test_a_stand_in_that_is_not_rendered_or_shown_as_wires_does_not_print(walk, how, to):
     scene, armature, _ = walk
     shown, _ = prints_of(scene)
     stand_in = cube(scene, "Stand-in", parent=armature, bone=scene.softground.characters[0].soles[0].bone)
     assert prints_of(scene)[0] != shown
-    stand_in.hide_render = True
+    setattr(stand_in, how, to)
     hidden, said = prints_of(scene)
     assert hidden == shown
     assert "hidden_skin" not in said

@@ -3,8 +3,10 @@
 import bpy
 import pytest
 
+from softground_addon.blender.characters import character_setup
 from softground_addon.blender.compat import HAS_SLOTS, set_slot, slot_of
 from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.rigs.worn_rigs import rigs_below
 from tests.blender.grounds import bake, plane
 
 
@@ -185,3 +187,23 @@ def test_a_ground_whose_prints_are_not_seen_in_the_scene_is_said(short_walk, whe
         scene.collection.objects.link(shown)
     codes = {one["code"] for one in bake(short_walk, ground=ground).report["self_check"]}
     assert ("unseen_ground" in codes) == (where == "another scene")
+
+
+@pytest.mark.parametrize("added", [False, True])
+def test_legs_with_a_rig_of_their_own_under_a_trunk_are_named(short_walk, added):
+    """Select a trunk alone, and its arms would be taken for legs in silence."""
+    trunk = rig_of(short_walk)
+    legs, skin = trunk.copy(), bpy.data.objects.new("Skin", bpy.data.meshes.new("Skin"))
+    legs.data, legs.location.z = trunk.data.copy(), trunk.location.z - 0.6
+    for obj in (legs, skin):
+        short_walk.collection.objects.link(obj)
+    skin.modifiers.new("Armature", "ARMATURE").object = legs
+    bpy.context.view_layer.update()
+    assert rigs_below(short_walk.objects, trunk) == [legs]
+    assert rigs_below(short_walk.objects, legs) == []
+    if added:
+        character_setup.add_character(short_walk, legs)
+        short_walk.softground.characters[1].armature.location.z += 0.6
+    findings = {one["code"]: one["message"] for one in bake(short_walk).report["self_check"]}
+    assert ("rig_below" in findings) == (not added)
+    assert added or f"'{legs.name}' stands under '{trunk.name}'" in findings["rig_below"]

@@ -53,6 +53,17 @@ def test_a_loop_without_offset_presses_as_its_turns_do_each_alone(rate):
         np.testing.assert_allclose(sole.transforms[second][::steps], other.transforms[::steps], atol=1e-12)
 
 
+@pytest.mark.parametrize("rate", [24.0, 30.0])
+def test_a_fifth_of_a_second_that_is_cut_out_of_a_walk_is_a_jump(rate):
+    once = walked(rate)
+    first, count = len(once.frames) // 2, len(once.frames)
+    brisk = np.arange(count)[:, None] * (1.4 / rate, 0.0, 0.0) + (0.0, 0.0, 0.9)
+    once = replace(once, joints=dict.fromkeys(("hips", "neck", "head"), brisk))
+    assert list(once.starts) == [0]
+    cut = at_samples(once, np.concatenate([np.arange(first), np.arange(first + round(rate / 5), count)]))
+    assert list(cut.starts) == [0, first]
+
+
 def test_no_pose_lies_between_two_places():
     once = walked(24.0)
     count = len(once.frames)
