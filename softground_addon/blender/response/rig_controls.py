@@ -103,8 +103,8 @@ def travelling_bone(armature: bpy.types.Object, evaluated: bpy.types.Object, map
 def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     """The nearest bone behind the hips that also carries both thighs and the head, and that can be moved."""
     joints = mapping.joints
-    hip_joints = [joint for joint in joints if joint.startswith("hip")]
-    carried = [joints[joint][0] for joint in (*hip_joints, "head", "neck", "spine") if joint in joints]
+    thighs = [joint for joint in joints if joint.startswith("hip_")]
+    carried = [joints[joint][0] for joint in ("hips", *thighs, "head", "neck", "spine") if joint in joints]
     if not carried:
         carried = [source.bone for source in mapping.soles if source.bone]
     if not carried:

@@ -365,12 +365,13 @@ def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
 
 
 def _is_on_ankle(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
-    """True if a sole is near the ankle of a side and no other is nearer, or moves with it."""
-    middle = sole.landmark_positions().mean(axis=1)
-    ankles = [motion.joints[f"ankle_{leg}"] for leg in leg_sides(motion.joints) if f"ankle_{leg}" in motion.joints]
-    nearest = min(float(np.linalg.norm(middle - ankle, axis=-1).mean()) for ankle in ankles)
-    distance = np.linalg.norm(middle - motion.joints[f"ankle_{side}"], axis=-1)
-    if not sole.sole.side and distance.mean() > nearest:
+    """True if a sole is near the ankle of a side, or moves with it, and no other ankle of its side is nearer."""
+    middle, own = sole.landmark_positions().mean(axis=1), sole.sole.side.lower()
+    legs = [side, *(leg for leg in leg_sides(motion.joints) if own in ("", leg[0]))]
+    ankles = [motion.joints[f"ankle_{leg}"] for leg in legs if f"ankle_{leg}" in motion.joints]
+    away = [np.linalg.norm(middle - ankle, axis=-1) for ankle in ankles]
+    distance = away[0]
+    if distance.mean() > min(float(each.mean()) for each in away):
         return False
     is_near = float(distance.mean()) <= ON_THE_ANKLE * motion.leg_length
     is_rigid = float(np.ptp(distance)) < RIGID * motion.leg_length
