@@ -104,7 +104,7 @@ def _cleaned(
     feet: Faults = {"before": {}, "after": {}}
     now, floor = Progress("simulate", 1.0), GroundHistory(shot.terrain)
     each = zip(shot.motions, loads, wanted.characters, strict=True)
-    rigged = [entry for entry in each if entry[0].centre is None]
+    rigged = [entry for entry in each if entry[2].armature]
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.standing, of_character.motion.frames, motion)

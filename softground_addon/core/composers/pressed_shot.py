@@ -118,7 +118,9 @@ def press_shot(
         shares = yield from shares_of(wanted, now.motions, loads, terrain)
         footprints, forces = yield from _pressed(wanted, shares, grounds)
     records = yield from _edited(wanted, grounds, footprints, edits)
-    responses = yield from responses_of.slices(loads, motions, terrain, records, asked)
+    rigged = [bool(character.armature) for character in wanted.characters]
+    with_rig = list(compress(loads, rigged)), list(compress(motions, rigged))
+    responses = yield from responses_of.slices(*with_rig, terrain, records, asked)
     return PressedShot(loads, shares, records, forces, responses)
 
 

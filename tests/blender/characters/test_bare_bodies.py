@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import settings
+from softground_addon.blender.baking import bake_job, clean_feet
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.selection import set_up_automatically
+from softground_addon.blender.jobs import run
 from softground_addon.blender.reading import analysis, staleness
 from softground_addon.blender.sampling.body_sampling import deforms, meshes_of
 from softground_addon.core.errors import InputError
@@ -177,3 +179,30 @@ def test_a_body_of_shape_keys_walks_as_the_rig_that_it_came_from(scene):
     total = ours.forces.forces[..., 2].sum(axis=1), theirs.forces.forces[..., 2].sum(axis=1)
     assert np.abs(total[0] - total[1]).mean() < 0.02 * weight
     assert of_parts.contacts.typical == pytest.approx(twin.contacts.typical, rel=0.05)
+
+
+def test_beside_a_body_without_a_rig_a_rig_responds_by_its_own_steps(scene):
+    """Responses are told apart by name: the first of them is of the robot, which has no bones to key."""
+    top = robot(scene)
+    top.location.x = 3.0
+    select(top)
+    bpy.ops.softground.add_character()
+    armature = shots.walker(scene, frames=48)
+    select(armature)
+    bpy.ops.softground.add_character()
+    assert [character.armature for character in scene.softground.characters] == [None, armature]
+    scene.frame_end = scene.softground.frame_end = 48
+    shots.coarse(scene)
+    scene.softground.sink_feet = True
+    report = run(bake_job.bake(scene)).report
+    gaps = report["gaps_mm"]["after"][armature.name]
+    assert gaps["float"]["p95"] < 2.0 < report["gaps_mm"]["before"][armature.name]["float"]["p95"]
+    assert {"foot.L", "foot.R"} <= {bone.name for bone in armature.pose.bones if len(bone.constraints)}
+    scene.frame_set(24)
+    lowest = min((armature.matrix_world @ armature.pose.bones[f"foot.{side}"].tail).z for side in "LR")
+    for constraint in (bone.constraints[0] for bone in armature.pose.bones if len(bone.constraints)):
+        constraint.mute = True
+    bpy.context.view_layer.update()
+    source = min((armature.matrix_world @ armature.pose.bones[f"foot.{side}"].tail).z for side in "LR")
+    assert lowest < source - 0.01, "it is let down into its own prints"
+    assert run(clean_feet.clean_feet(scene)).feet["after"].keys() == {armature.name}
