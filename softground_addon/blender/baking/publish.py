@@ -37,6 +37,7 @@ from ..plants import trampling_table
 from ..playback import display_key, playback
 from ..reading import staleness
 from ..reuse import reused
+from . import waded_steps
 
 
 @dataclass(frozen=True)
@@ -190,6 +191,7 @@ def publish(record: BakeRecord, debris: Debris | None, place: Place, made_with: 
     }
     debris_object.put(ground, debris, surface=made_with.surface, units=made_with, of_steps=of_steps)
     trampled_ground.write(ground, trampled, made_with)
+    waded_steps.follow(made_with.scene)
     return Published(ground, shown, error)
 
 

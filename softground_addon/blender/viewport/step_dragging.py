@@ -16,14 +16,14 @@ from ...core.errors import SoftGroundError
 from ...core.numerics.arrays import Array
 from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
-from ..baking import step_edits, step_preview
+from ..baking import step_edits
 from ..ground import baked_ground, baked_steps
 from ..operator_base import Checked
 from ..placement import from_scene, in_scene
 from ..remedies import said
 from ..state import state
 from ..translation import translated
-from . import overlay
+from . import overlay, step_preview
 from .step_editing import EditJob, OnSteps, Wanted, changed, toggle
 
 TURN_STEP = 5.0

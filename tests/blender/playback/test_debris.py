@@ -17,11 +17,11 @@ from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
 from softground_addon.blender import compat, jobs, mesh_arrays, settings
 from softground_addon.blender.baking import bake_job, bake_report, step_edits
-from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.debris import debris_object, debris_shapes
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes import node_modifiers
 from softground_addon.blender.output import exports, image_exports
+from softground_addon.blender.viewport.step_preview import StepPreview
 from softground_addon.core.debris import flight
 from softground_addon.core.ground.surfaces import SURFACES
 from softground_addon.core.record import record

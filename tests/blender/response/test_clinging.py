@@ -4,9 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.carried import clinging
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.nodes.node_modifiers import set_inputs
-from softground_addon.blender.operators import clinging
 from tests.blender import shots
 
 HALF_AFTER = 0.5
@@ -31,6 +31,21 @@ def edges(figure):
     return [float(z[leg].max(initial=0.0)) for leg in clad]
 
 
+def steps_of(ground, scale):
+    """The frame in the middle of each step, and its depth [units of the mesh], by foot."""
+    steps = {"foot.L": [], "foot.R": []}
+    for step in baked_ground.record_of(ground).footprints:
+        steps[step.sole].append(((step.start_frame + step.end_frame) / 2, step.max_depth_m / scale))
+    return steps
+
+
+def remaining(steps):
+    """Height of the edge on each leg at frame 44, after some of it has fallen off [units of the mesh]."""
+    return [
+        max(depth * 0.5 ** ((44 - at) / 24 / HALF_AFTER) for at, depth in taken if at <= 44) for taken in steps.values()
+    ]
+
+
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_snow_clings_as_high_as_each_leg_has_waded_so_far_and_the_modifier_alone_brings_it(scene, scale):
     armature = shots.walker(scene, frames=44)
@@ -49,9 +64,7 @@ def test_snow_clings_as_high_as_each_leg_has_waded_so_far_and_the_modifier_alone
     assert [modifier.type for modifier in figure.modifiers] == ["NODES", "ARMATURE"]
     assert np.array_equal(shown(figure)[0], before[0])
 
-    steps = {"foot.L": [], "foot.R": []}
-    for step in baked_ground.record_of(options.ground).footprints:
-        steps[step.sole].append(((step.start_frame + step.end_frame) / 2, step.max_depth_m / scale))
+    steps = steps_of(options.ground, scale)
     assert min(middle for middle, _ in steps["foot.R"]) > 10
     for frame in (1, 10, 20, 44):
         scene.frame_set(frame)
@@ -63,14 +76,22 @@ def test_snow_clings_as_high_as_each_leg_has_waded_so_far_and_the_modifier_alone
     set_inputs(modifier, {"Half After": HALF_AFTER})
     figure.update_tag()
     scene.frame_set(44)
-    left = [
-        max(depth * 0.5 ** ((44 - at) / 24 / HALF_AFTER) for at, depth in taken if at <= 44) for taken in steps.values()
-    ]
-    assert edges(figure) == pytest.approx(left, abs=0.04)
+    assert edges(figure) == pytest.approx(remaining(steps), abs=0.04)
     assert bpy.ops.softground.cling() == {"FINISHED"}
     assert [group.name for group in bpy.data.node_groups if clinging.is_clinging(group)] == [modifier.node_group.name]
 
+    options.material.youngs_modulus *= 8
+    bpy.ops.softground.bake()
+    scene.frame_set(44)
+    shallower = steps_of(options.ground, scale)
+    assert max(remaining(shallower)) < max(remaining(steps)) - 0.05
+    assert edges(figure) == pytest.approx(remaining(shallower), abs=0.04)  # it follows a bake, with its own settings
+    assert sum(map(clinging.is_clinging, bpy.data.node_groups)) == 1
+
     figure.modifiers.remove(modifier)
+    bpy.ops.softground.bake()
+    options.material.youngs_modulus /= 8
+    bpy.ops.softground.bake()
     scene.frame_set(30)
     assert np.array_equal(shown(figure)[0], before[0])
     assert shown(figure)[1] is None

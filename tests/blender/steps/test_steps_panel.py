@@ -13,12 +13,12 @@ from mathutils import Matrix
 
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_report, step_edits, step_soles
-from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.panels import steps_panel
 from softground_addon.blender.playback.display_key import DISPLAY_KEY
 from softground_addon.blender.state import state
 from softground_addon.blender.viewport import step_dragging, step_editing
+from softground_addon.blender.viewport.step_preview import StepPreview
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import fingerprints, shots

@@ -233,7 +233,7 @@ def drag(hand: Hand, facts: dict, *, dy: float, moves: int = MOVES, picture: str
     facts["under the mouse"] = module("state").state.under == steps()[2].name
     hand.event("LEFTMOUSE", "PRESS")
     yield 0.5
-    took = timed(module("baking.step_preview").StepPreview, "show")
+    took = timed(module("viewport.step_preview").StepPreview, "show")
     for number in range(1, moves + 1):
         place = (middle[0], middle[1] + dy * number / moves, middle[2])
         hand.place = on_screen(hand, place)

@@ -14,11 +14,11 @@ from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from .. import session, settings
+from ..baking.publish import at_the_end
+from ..baking.step_edits import EditableBake
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, ground_surface
 from ..playback import display_key, playback
-from .publish import at_the_end
-from .step_edits import EditableBake
 
 REACH = 4.0
 """How far around a print the display blur spreads it, in its standard deviations."""

@@ -1,0 +1,61 @@
+"""The steps by which a character has waded, for what clings to its legs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+from ...core.errors import InputError
+from .. import settings
+from ..carried import clinging
+from ..ground import baked_ground
+from ..nodes.node_modifiers import modifier_with
+from ..playback.playback import barrier_on
+from ..sampling.skin_sampling import meshes_on
+
+
+def cling(scene: bpy.types.Scene, character: Any) -> int:
+    """Let what a character waded in cling to its meshes; their number.
+
+    Raises
+    ------
+    InputError
+        If it deforms none.
+    """
+    armature = character.armature
+    every, soles = meshes_on(scene.objects, armature), _soles_of(character)
+    meshes = [obj for obj in every if not (obj.library or obj.parent_type == "BONE" or barrier_on(obj))]
+    if not (meshes and soles):
+        raise InputError(f"'{armature.name}' deforms no mesh that stands on its bones.")
+    clinging.cling(scene, armature, soles, meshes, _steps(scene, character))
+    return len(meshes)
+
+
+def follow(name: str) -> None:
+    """Bring what clings to the characters of a scene up to date with the bakes of all grounds."""
+    scene = bpy.data.scenes.get(name)
+    if scene is None or not any(map(clinging.is_clinging, bpy.data.node_groups)):
+        return
+    for character in scene.softground.characters:
+        every = meshes_on(scene.objects, character.armature) if character.armature else ()
+        meshes = [obj for obj in every if modifier_with(obj, clinging.is_clinging)]
+        if meshes and (soles := _soles_of(character)):
+            clinging.cling(scene, character.armature, soles, meshes, _steps(scene, character))
+
+
+def _soles_of(character: Any) -> list[Any]:
+    return [sole for sole in character.soles if sole.bone in character.armature.data.bones]
+
+
+def _steps(scene: bpy.types.Scene, character: Any) -> Iterator[clinging.Step]:
+    """The steps of a character on all grounds."""
+    names = [sole.name for sole in _soles_of(character)]
+    baked = (ground for ground in settings.grounds_of(scene.softground) if baked_ground.is_baked(ground))
+    for record in map(baked_ground.record_of, baked):
+        stretch = baked_ground.units_of(record.about["inputs"]).time_stretch
+        for step in record.edited:
+            if step.character == character.armature.name and step.sole in names:
+                middle = (step.start_frame + step.end_frame) / 2 * stretch
+                yield names.index(step.sole), middle, step.max_depth_m
