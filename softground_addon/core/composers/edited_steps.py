@@ -21,6 +21,7 @@ from ..imprints.sole_points import SolePoints, sole_points
 from ..numerics.arrays import Mask
 from ..numerics.cell_keys import Keys, among
 from ..numerics.slices import Slices, sliced, without_warnings
+from ..playback.blocks import changed_by
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.edited_contacts import edited_contact
 from ..pressing.ground_cells import GroundCells, UndisturbedCells
@@ -32,7 +33,7 @@ from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from ..record.footprints import Footprint
 from ..record.mesh_sole import MeshSole
 from ..record.record import BakeRecord
-from .replayed_step import Layout, ReplayedStep, changed_by, grid_of, keys_of_cells, window_of
+from .replayed_step import Layout, ReplayedStep, grid_of, keys_of_cells, window_of
 
 Change = tuple[int, StepEdit]
 """Number of a step, and what was changed of it."""
@@ -230,13 +231,10 @@ class EditedSteps:
         before, window = self._before(number), self._baked(number).window
         window = window.union(after.window) if after else window
         difference = np.zeros((2 if either else 1, window.rows, window.columns))
-        if before is not None:
-            unpacked = self._unpacked.get(number) or ReplayedStep(before)
-            for of_quantity, quantity in zip(difference, ("compression", "rim"), strict=False):
-                of_quantity[window.slices(before.window)] -= getattr(unpacked, quantity)
-        if after is not None:
-            for of_quantity, changes in zip(difference, (after.compression, after.rim), strict=False):
-                of_quantity[window.slices(after.window)] += after.tile(changes)
+        for footprint, sign in ((before, -1.0), (after, 1.0)):
+            if footprint is not None:
+                for of_quantity, changes in zip(difference, (footprint.compression, footprint.rim), strict=False):
+                    of_quantity[window.slices(footprint.window)] += sign * footprint.tile(changes)
         differs = (np.abs(difference) > VISIBLE).any(axis=0)
         if self._ground.weathering and not _at_once(before, after):  # of other age, whatever its depth
             for footprint in (before, after):

@@ -77,16 +77,6 @@ class ReplayedStep:
         self._footprint = footprint
 
     @cached_property
-    def compression(self) -> Array:
-        """All that it compressed, (rows, columns) of its window [m]."""
-        return self._footprint.tile(self._footprint.compression)
-
-    @cached_property
-    def rim(self) -> Array:
-        """All that it raised, (rows, columns) of its window [m]."""
-        return self._footprint.tile(self._footprint.rim)
-
-    @cached_property
     def _pressing(self) -> Changes:
         return self._footprint.pressing
 
@@ -129,15 +119,6 @@ class ReplayedStep:
             within = slice(first[part.start], first[part.stop])
             sums.append(np.bincount(cells[within], amounts[within], window.cells))
         return np.asarray(np.stack(sums).reshape(2, window.rows, window.columns) * QUANTUM)
-
-
-def changed_by(footprint: Footprint) -> NDArray[np.bool_]:
-    """The cells that a print changed or touched, (rows, columns) of its window."""
-    window = footprint.window
-    changed = np.zeros(window.cells, bool)
-    for cells in (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells):
-        changed[cells[:]] = True
-    return changed.reshape(window.rows, window.columns)
 
 
 def keys_of_cells(window: Window, cells: NDArray[np.integer]) -> Keys:

@@ -54,7 +54,7 @@ LARGEST_SHARE = 0.25
 """Of what a step throws in one phase, in its largest piece."""
 ALL_PIECES = 250_000
 """That all landings and pushes of a bake throw together: what is more is drawn as larger ones."""
-TOGETHER = 20_000
+TOGETHER = 100_000
 """Whose landings are computed in one slice at most."""
 MOST_SHED = 1000
 """That a sole sheds."""

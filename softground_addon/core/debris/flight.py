@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..numerics.arrays import Array
 from ..numerics.cell_keys import among, cells_of, keys_of
@@ -121,6 +120,8 @@ class SampledHeights:
         Heights at places x, y (N,) [m]; NaN where there is no ground.
     side : float
         Of a square [m].
+    is_quick : bool
+        True where looking up takes longer than working out: each corner is worked out whenever it is asked for.
 
     Examples
     --------
@@ -129,8 +130,8 @@ class SampledHeights:
     [0.66, -2.25]
     """
 
-    def __init__(self, height: Callable[[Array, Array], Array], side: float) -> None:
-        self._height, self._side = height, side
+    def __init__(self, height: Callable[[Array, Array], Array], side: float, *, is_quick: bool = False) -> None:
+        self._height, self._side, self._is_quick = height, side, is_quick
         self._keys, self._values = np.empty(0, np.int64), np.empty(0)
 
     def __call__(self, x: Array, y: Array) -> Array:
@@ -140,17 +141,19 @@ class SampledHeights:
         u, v = (at - first).T
         low, high = 1.0 - u, 1.0 - v
         weights = (low * high, u * high, low * v, u * v)
-        corners = [keys_of(first + shift) for shift in ((0, 0), (1, 0), (0, 1), (1, 1))]
-        self._look_up(np.concatenate(corners))
-        values = (self._values[np.searchsorted(self._keys, keys)] for keys in corners)
-        return np.asarray(sum(weight * value for weight, value in zip(weights, values, strict=True)))
-
-    def _look_up(self, wanted: NDArray[np.int64]) -> None:
+        around = [first + shift for shift in ((0, 0), (1, 0), (0, 1), (1, 1))]
+        if self._is_quick:
+            heights = [self._height(*(corner * self._side).T) for corner in around]
+            return np.asarray(sum(weight * value for weight, value in zip(weights, heights, strict=True)))
+        corners = [keys_of(corner) for corner in around]
+        wanted = np.concatenate(corners)
         new = np.unique(wanted[~among(self._keys, wanted)])
         if len(new):
             place = np.searchsorted(self._keys, new)
             self._values = np.insert(self._values, place, self._height(*(cells_of(new) * self._side).T))
             self._keys = np.insert(self._keys, place, new)
+        values = (self._values[np.searchsorted(self._keys, keys)] for keys in corners)
+        return np.asarray(sum(weight * value for weight, value in zip(weights, values, strict=True)))
 
 
 def _down_to(level: Array, start: Array, velocity: Array, drag_time: Array, gravity: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ..events.phases import Phase
 from ..ground import surfaces
 from ..ground.surfaces import ThrownMatter
 from ..loads.estimate import CharacterLoads
-from ..numerics.arrays import Array
+from ..numerics.arrays import Array, Mask
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.throws import Throw, ThrowKind
@@ -51,6 +52,7 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
     for character in loads:
         of_character = [phase for phase in phases.phases(character) if not phase.hard]
         sliding = np.zeros(character.contacts.touching.shape, bool)
+        speed = cache(partial(phases.slide_speed, character))
         for phase in of_character:
             if phase.kind == "slide_start":
                 sliding[phase.first : phase.last, phase.sole] = True
@@ -59,30 +61,30 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
             number = _footprint_of(character, phase, footprints)
             if number is not None:
                 of_step = surfaces.find(footprints[number].surface or surface)
-                throws += _throws(character, phase, number, of_step.thrown, sliding)
+                throws += _throws(character, phase, number, of_step.thrown, sliding, speed(phase.sole))
     return throws
 
 
 def _throws(
-    loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter, sliding: NDArray[np.bool_]
+    loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter, sliding: Mask, speed: Array
 ) -> Iterator[Throw]:
     motion, step = loads.motion, loads.motion.time_step
     if phase.kind in ("heel_strike", "land"):
-        speed = phases.landing_speed(loads, phase.sole, phase.at)
+        landing = phases.landing_speed(loads, phase.sole, phase.at)
         middle = phases.place_of(loads, phase.sole, phase.at)
         along = phases.sole_velocity(loads, phase.sole, max(phase.at - 1, 0))
         rows = np.concatenate([np.ones(1), np.zeros(3), middle, along])[None]
-        yield _throw(loads, phase, number, ThrowKind.LANDING, np.array([phase.at]), rows, speed)
+        yield _throw(loads, phase, number, ThrowKind.LANDING, np.array([phase.at]), rows, landing)
     if phase.kind == "slide_start":  # what slides under load has overcome what the ground can bear
         steps = np.arange(phase.first, phase.last)
-        slid = phases.slide_speed(loads, phase.sole)[steps] * step
+        slid = speed[steps] * step
         _, velocities = phases.sole_points_at(loads, phase.sole, steps)
         aim = velocities.mean(axis=1) * (1.0, 1.0, 0.0)
         aim /= np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-9)
         yield _throw(loads, phase, number, ThrowKind.PUSH, steps, _rows(loads, phase.sole, steps, slid, aim))
     if phase.kind == "toe_off":
         steps = np.arange(max(0, phase.at - max(1, round(PUSHING / step))), phase.at)
-        slid = _slid(loads, phase, steps, matter) * ~sliding[steps, phase.sole]
+        slid = speed[steps] * _slips(loads, phase, steps, matter) * step * ~sliding[steps, phase.sole]
         if slid.any():
             force = loads.forces.forces[steps, phase.sole, :2]
             aim = np.zeros((len(steps), 3))
@@ -125,8 +127,8 @@ def _rows(loads: CharacterLoads, sole: int, steps: NDArray[np.intp], weights: Ar
     return np.concatenate(parts, axis=1)
 
 
-def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Array:
-    """Slide of a sole in each step as it pushes along the ground harder than that can bear, (K,) [m].
+def _slips(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Mask:
+    """True for steps in which a sole pushes along the ground harder than that can bear, (K,).
 
     Where it hardly presses, the direction of its force tells nothing.
     """
@@ -134,8 +136,7 @@ def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: 
     pressing = np.einsum("ni,ni->n", force, normal)
     along = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
     loaded = pressing > PRESSED * loads.motion.mass * loads.motion.gravity
-    slips = loaded & (along > np.tan(np.radians(matter.repose)) * pressing)
-    return np.asarray(phases.slide_speed(loads, phase.sole)[steps] * slips * loads.motion.time_step)
+    return np.asarray(loaded & (along > np.tan(np.radians(matter.repose)) * pressing))
 
 
 def _footprint_of(loads: CharacterLoads, phase: Phase, footprints: Sequence[Footprint]) -> int | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import damaged_record
+from ..ground.heightfield import FlatTerrain
 from ..ground.soft_ground import SoftGround, Weathering
 from ..ground.sparse_grid import SparseGrid
 from ..loads.estimate import CharacterLoads
@@ -69,7 +70,8 @@ def _thrown(
     record = replace(record, thrown=volumes(thrown_by))
     pressed = recompose(record.shaping, cell_size=cell_size)
     yield
-    bare = flight.SampledHeights(ground.terrain.heights, cell_size)  # thousands fall side by side
+    is_flat = isinstance(ground.terrain, FlatTerrain)  # else thousands fall side by side
+    bare = flight.SampledHeights(ground.terrain.heights, cell_size, is_quick=is_flat)
 
     def height(x: Array, y: Array) -> Array:
         compression, rim = pressed.sample(x, y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
+from functools import lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -260,18 +261,16 @@ class SampledGrid(SparseGrid):
         return self.tiles[key]
 
 
-def overlaps(window: Window) -> Iterator[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:
+@lru_cache(maxsize=16)
+def overlaps(window: Window) -> list[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:
     """Each tile that a window reaches into, with the shared cells as slices of the tile and of the window."""
-    for tile_row in range(window.row // TILE, (window.row + window.rows - 1) // TILE + 1):
-        first_row = max(window.row, tile_row * TILE)
-        last_row = min(window.row + window.rows, (tile_row + 1) * TILE)
-        tile_rows = slice(first_row - tile_row * TILE, last_row - tile_row * TILE)
-        window_rows = slice(first_row - window.row, last_row - window.row)
-        for tile_column in range(window.column // TILE, (window.column + window.columns - 1) // TILE + 1):
-            first = max(window.column, tile_column * TILE)
-            last = min(window.column + window.columns, (tile_column + 1) * TILE)
-            yield (
-                (tile_column, tile_row),
-                (slice(None), tile_rows, slice(first - tile_column * TILE, last - tile_column * TILE)),
-                (slice(None), window_rows, slice(first - window.column, last - window.column)),
-            )
+    columns, rows = list(_parts(window.column, window.columns)), _parts(window.row, window.rows)
+    every, both = slice(None), [(row, column) for row in rows for column in columns]
+    return [((right[0], up[0]), (every, up[1], right[1]), (every, up[2], right[2])) for up, right in both]
+
+
+def _parts(first: int, cells: int) -> Iterator[tuple[int, slice, slice]]:
+    """Each tile along an axis that a window reaches into, with the shared cells of either."""
+    for tile in range(first // TILE, (first + cells - 1) // TILE + 1):
+        low, high = max(first, tile * TILE), min(first + cells, (tile + 1) * TILE)
+        yield tile, slice(low - tile * TILE, high - tile * TILE), slice(low - first, high - first)

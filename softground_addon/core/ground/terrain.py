@@ -51,21 +51,22 @@ def plane_of(vertices: Array, triangles: Indices) -> Slices[FlatTerrain | None]:
     """
     if not len(triangles) or not np.isfinite(vertices).all() or np.ptp(vertices[:, 2]) > 0:
         return None
-    place = vertices[:, :2]
-    low, high = place.min(axis=0), place.max(axis=0)
+    place = np.ascontiguousarray(vertices[:, :2].T)
+    low, high = place.min(axis=1), place.max(axis=1)
+    ends = (at == end for at, *both in zip(place, low, high, strict=True) for end in both)
+    sides = np.packbits([*ends], axis=0)[0]
     first, second = np.random.default_rng(0).integers(2**63, size=(2, len(vertices)), dtype=np.uint64)
     sum_of_edges = np.zeros(1, dtype=np.uint64)  # each adds what it takes off the other way round
     for number in range(0, len(triangles), PLACES_AT_ONCE):
         yield
-        part = triangles[number : number + PLACES_AT_ONCE]
-        to_second, to_third = np.diff(place[part], axis=1).swapaxes(0, 1)
-        if not (to_second[:, 0] * to_third[:, 1] - to_second[:, 1] * to_third[:, 0] > 0).all():
+        begin = triangles[number : number + PLACES_AT_ONCE].T
+        end = begin[[1, 2, 0]]
+        along_x, along_y = (axis.take(end) - axis.take(begin) for axis in place)
+        if not (along_x[0] * along_y[1] > along_y[0] * along_x[1]).all():
             return None
-        begin, end = part.ravel(), part[:, [1, 2, 0]].ravel()
-        at, to = place[begin], place[end]
-        inner = ~((at == to) & ((at == low) | (at == high))).any(axis=1)
+        inner = (sides.take(begin) & sides.take(end)) == 0
         begin, end = begin[inner], end[inner]
-        sum_of_edges += (first[begin] * second[end] - first[end] * second[begin]).sum()
+        sum_of_edges += (first.take(begin) * second.take(end) - first.take(end) * second.take(begin)).sum()
     if sum_of_edges.any():
         return None
     return FlatTerrain(float(vertices[0, 2]), tuple(low.tolist()), tuple(high.tolist()))

@@ -123,7 +123,7 @@ def _underside(
     v = along_x[1][:, None, :] + along_y[1][:, :, None]
     shift = np.einsum("ijn,nj->in", inverse, rotation[:, :2, 2]).astype(np.float32)[..., None]
     sideways = np.abs(shift).max(axis=(1, 2)) * np.abs(patch.heights).max()
-    low, high = _outline_box(patch)
+    low, high = patch.box
     slack_u, slack_v = cell_size + sideways
     near = (u > low[0] - slack_u) & (u < high[0] + slack_u) & (v > low[1] - slack_v) & (v < high[1] + slack_v)
     cells = np.flatnonzero(near.any(axis=0))
@@ -148,17 +148,9 @@ def _underside(
     return cells, height, covered_fraction(distance, cell_size)
 
 
-def _outline_box(patch: SolePatch) -> tuple[Array, Array]:
-    """Lower and upper corner (x, y, height) of the underside within a patch's outline, and a node around it."""
-    row, column = np.nonzero(patch.signed_distance <= patch.spacing)
-    x, y = patch.origin[0] + column * patch.spacing, patch.origin[1] + row * patch.spacing
-    points = np.stack([x, y, patch.heights[row, column]])
-    return points.min(axis=1), points.max(axis=1)
-
-
 def _columns_and_rows(patch: SolePatch, pose: Array, x: Array, y: Array) -> tuple[slice, slice]:
     """The columns at x and the rows at y that a patch may cover at any of the steps, and one around them."""
-    low, high = _outline_box(patch)
+    low, high = patch.box
     centre = pose[:, :2, :3] @ ((low + high) / 2) + pose[:, :2, 3]
     extent = np.abs(pose[:, :2, :3]) @ ((high - low) / 2)
     first, last = (centre - extent).min(axis=0), (centre + extent).max(axis=0)

@@ -6,6 +6,7 @@ They measure height and area whatever the size of the cells and wherever the sol
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 from typing import Any
 
@@ -50,6 +51,12 @@ class PatchPoints:
     positions: Array
     normals: Array
     area: Array
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Middle of the box around the points, and half of its size, (3,) each [m]."""
+        low, high = self.positions.min(axis=0), self.positions.max(axis=0)
+        return (low + high) / 2, (high - low) / 2
 
 
 @dataclass(frozen=True)
@@ -146,8 +153,7 @@ def reach(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
     corners = []
     for number, patch in enumerate(points.patches):
         if len(patch.positions):
-            low, high = patch.positions.min(axis=0), patch.positions.max(axis=0)
-            middle, half = (low + high) / 2, (high - low) / 2
+            middle, half = patch.box
             pose = transforms[:, number]
             centre = pose[:, :3, :3] @ middle + pose[:, :3, 3]
             extent = np.abs(pose[:, :3, :3]) @ half

@@ -61,6 +61,14 @@ class SolePatch:
         """Area inside the outline [m²], with edge nodes counted by their covered fraction."""
         return float(np.clip(0.5 - self.signed_distance / self.spacing, 0.0, 1.0).sum() * self.spacing**2)
 
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Lower and upper corner (x, y, height) of the underside within the outline, and a node around it [m]."""
+        row, column = np.nonzero(self.signed_distance <= self.spacing)
+        x, y = self.origin[0] + column * self.spacing, self.origin[1] + row * self.spacing
+        points = np.stack([x, y, self.heights[row, column]])
+        return points.min(axis=1), points.max(axis=1)
+
 
 @dataclass(frozen=True)
 class Sole:

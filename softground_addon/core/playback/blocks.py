@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..ground.sparse_grid import Window
-from ..numerics.arrays import Array
+from ..numerics.arrays import Array, Mask
 from ..numerics.packed import PackedArray
 from ..record.footprints import QUANTUM, Footprint
 
@@ -26,6 +26,11 @@ class ChangesInBlocks:
 
     def __init__(self, footprint: Footprint, *, is_small: bool = False) -> None:
         self.footprint, self._is_small = footprint, is_small
+
+    @cached_property
+    def changed(self) -> Mask:
+        """See `changed_by`."""
+        return changed_by(self.footprint)
 
     @cached_property
     def _blocks(self) -> list[list[PackedArray[np.int32]]]:
@@ -77,3 +82,12 @@ def _blocks_along(cells: int) -> int:
 def _reached(first: int, cells: int) -> slice:
     """Numbers of the blocks along a side that hold cells; the first cell may be negative."""
     return slice(max(first, 0) // BLOCK, max(_blocks_along(first + cells), 0))
+
+
+def changed_by(footprint: Footprint) -> Mask:
+    """The cells that a print changed or touched, (rows, columns) of its window."""
+    window = footprint.window
+    changed = np.zeros(window.cells, bool)
+    for cells in (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells):
+        changed[cells[:]] = True
+    return changed.reshape(window.rows, window.columns)

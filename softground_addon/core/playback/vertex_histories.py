@@ -154,10 +154,7 @@ def movements_at(
     contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
     is_carved = np.array([not len(footprint.contact_cells) for footprint in footprints], dtype=bool)
-    moving = [
-        _moving(footprint, window) if carved else None
-        for footprint, window, carved in zip(footprints, reach, is_carved, strict=True)
-    ]
+    moving = [_moving(in_blocks[number], window) for number, window in zip(near, reach, strict=True)]
     for number, footprint in enumerate(footprints):
         of_step = [_NO_RAMPS]
         alike = is_carved == is_carved[number]
@@ -182,14 +179,11 @@ def movements_at(
     return Movements(movements, joined(contacts), error)
 
 
-def _moving(footprint: Footprint, reach: Window) -> Mask:
+def _moving(in_blocks: ChangesInBlocks, reach: Window) -> Mask:
     """Cells of its reach (rows, columns) near which a footprint moves the ground: within the reach's margin."""
-    window = footprint.window
+    window = in_blocks.footprint.window
     moving = np.zeros((reach.rows, reach.columns), dtype=bool)
-    moves = moving[reach.slices(window)].reshape(-1)
-    for changes in (footprint.compression, footprint.rim):
-        moves[changes.cells[:]] = True
-    moving[reach.slices(window)] = moves.reshape(window.rows, window.columns)
+    moving[reach.slices(window)] = in_blocks.changed
     for along in (moving, moving.T):
         for _ in range(window.row - reach.row):
             before = along.copy()
@@ -198,11 +192,10 @@ def _moving(footprint: Footprint, reach: Window) -> Mask:
     return moving
 
 
-def _reached(reach: Window, moving: Mask | None, cell_size: float, x: Array, y: Array) -> Mask:
-    """True at places (N,) that a footprint moves: all in its reach, or those in its moving cells."""
+def _reached(reach: Window, moving: Mask, cell_size: float, x: Array, y: Array) -> Mask:
+    """True at places (N,) that a footprint moves: those in the moving cells of its reach."""
     column, row = np.floor(np.stack([x, y]) / cell_size).astype(np.intp)
-    within = reach.holds(row, column)
-    return within if moving is None else within & moving[reach.cells_under(x, y, cell_size)]
+    return reach.holds(row, column) & moving[reach.cells_under(x, y, cell_size)]
 
 
 def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[float, Array]) -> list[int]:
@@ -233,7 +226,7 @@ def _span(footprint: Footprint) -> tuple[float, float]:
 
 
 def _movements(
-    in_blocks: ChangesInBlocks, places: Places, kernel: Array, moving: Mask | None
+    in_blocks: ChangesInBlocks, places: Places, kernel: Array, moving: Mask
 ) -> Iterator[tuple[Indices, Array, Array]]:
     """Displayed height and compression of the places that a footprint moves, block by block; see `_reached`.
 
@@ -299,10 +292,6 @@ def _point_contacts(footprint: Footprint, places: Places) -> PointContacts:
     contact[footprint.contact_cells] = np.arange(len(footprint.contact_cells))
     touched = contact[row * window.columns + column]
     points, touched = points[touched >= 0], touched[touched >= 0]
-    pressure = footprint.peak_force_n / footprint.area_m2 if footprint.area_m2 > 0 else 0.0
-    return PointContacts(
-        points,
-        footprint.contact_start[touched],
-        footprint.contact_end[touched],
-        np.full(len(points), pressure),
-    )
+    pressure = np.full(len(points), footprint.peak_force_n / footprint.area_m2 if footprint.area_m2 > 0 else 0.0)
+    start, end = footprint.contact_start[touched], footprint.contact_end[touched]
+    return PointContacts(points, start, end, pressure)

@@ -54,6 +54,11 @@ class Changes:
     cells: Packed[np.int32] = Packed()
     amounts: Packed[np.int32] = Packed()
 
+    @cached_property
+    def total(self) -> Array:
+        """Sum of the changes of each cell, up to the last cell that changes [QUANTUM]."""
+        return np.bincount(self.cells, self.amounts).astype(np.float64)
+
 
 @dataclass(frozen=True)
 class Footprint:
@@ -126,9 +131,12 @@ class Footprint:
         # The change that is under way counts for the fraction of its frame that has passed.
         whole = int(np.searchsorted(changes.frames, frame, side="right"))
         under_way = int(np.searchsorted(changes.frames - self.frame_step, frame, side="left"))
-        end = changes.first[whole]
-        cells, amounts = changes.cells, changes.amounts
-        total = np.bincount(cells[:end], amounts[:end], self.window.cells).astype(np.float64)
+        total = np.zeros(self.window.cells)
+        if whole == len(changes.frames):
+            total[: len(changes.total)] = changes.total
+        else:
+            cells, amounts, end = changes.cells, changes.amounts, changes.first[whole]
+            total += np.bincount(cells[:end], amounts[:end], len(total))
         for k in range(whole, under_way):
             passed = 1.0 - (changes.frames[k] - frame) / self.frame_step
             passed = round(passed * PARTS_OF_A_FRAME) / PARTS_OF_A_FRAME

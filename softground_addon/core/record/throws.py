@@ -187,6 +187,7 @@ def booked(footprint: Footprint, volume: float) -> Footprint:
 def _changed(part: _Part, **values: Any) -> _Part:
     """Replace fields as `dataclasses.replace`, which would pack unchanged ones anew."""
     twin = copy(part)
+    vars(twin).pop("total", None)  # of the amounts as they were
     for name, value in values.items():
         object.__setattr__(twin, name, value)
     return twin

@@ -99,7 +99,7 @@ def _corners(seed: int, cells: list[NDArray[np.int64]]) -> Array:
     box = uniform(seed, *np.meshgrid(*axes, indexing="ij", sparse=True)) * 2.0 - 1.0
     strides = np.cumprod([1, *size[:0:-1]])[::-1].tolist()
     at = sum((axis - first) * stride for axis, first, stride in zip(cells, low, strides, strict=True))
-    return box.ravel()[at + sum(ends * stride for ends, stride in zip(both, strides, strict=True))]
+    return box.take(at + sum(ends * stride for ends, stride in zip(both, strides, strict=True)))
 
 
 def fractal(seed: int, size: float, octaves: int, gain: float, *place: Array, finest: float = 0.0) -> Array:

@@ -236,19 +236,16 @@ def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
     below = np.maximum.accumulate(np.where(chosen, row, -far - rows), axis=0)
     above = np.minimum.accumulate(np.where(chosen, row, 2 * rows + far)[::-1], axis=0)[::-1]
     source = np.where(row - below <= above - row, below, above)
-    high = np.minimum(np.abs(source - row), far + 1).astype(np.int32) ** 2
-    best = high.copy()
-    which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
-    in_column = which.copy()
+    high = np.minimum(np.abs(source - row), far + 1).astype(np.int64) ** 2
+    # Squares of distances with the cells behind them, so that one comparison takes the nearest of both.
+    in_column = (high << 32) + np.clip(source, 0, rows - 1) * columns + np.arange(columns)
+    best = in_column.copy()
     for shift in range(1, min(far, columns - 1) + 1):
-        if shift * shift >= best.max():
+        if shift * shift >= int(best.max()) >> 32:
             break
         for to, beside in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
-            distance = high[:, beside] + shift * shift
-            closer = distance < best[:, to]
-            np.copyto(best[:, to], distance, where=closer)
-            np.copyto(which[:, to], in_column[:, beside], where=closer)
-    return np.minimum(np.sqrt(best), float(far)), which
+            np.minimum(best[:, to], in_column[:, beside] + (shift * shift << 32), out=best[:, to])
+    return np.minimum(np.sqrt(best >> 32), float(far)), best & 0xFFFFFFFF
 
 
 def _blurred(values: Array, kernel: Array) -> Array:

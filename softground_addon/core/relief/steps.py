@@ -12,6 +12,7 @@ from ..ground.display_blur import gaussian_kernel
 from ..ground.heightfield import HeightField
 from ..ground.places import Places
 from ..numerics.arrays import Array, Indices
+from ..numerics.cell_keys import cells_at
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
@@ -179,8 +180,7 @@ def _carve(
 
 def _finest(places: Places, point: Indices, cell_size: float) -> float:
     """Distance between places around a print [m], as a whole part of a cell: finer detail cannot be shown there."""
-    column, row = np.floor(places.x[point] / cell_size), np.floor(places.y[point] / cell_size)
-    cells = len(np.unique(column + 1j * row))
+    cells = len(cells_at(np.stack([places.x[point], places.y[point]], axis=-1), cell_size))
     return float(cell_size / max(1.0, np.round(np.sqrt(len(point) / cells))))
 
 
