@@ -99,7 +99,7 @@ def test_a_bake_under_weather_takes_at_most_a_tenth_longer(scene, preset):
     bpy.ops.softground.load_preset(name=preset)
     jobs.run(bake_job.bake(scene))
     seconds = {False: [], True: []}
-    for _ in range(6):
+    for _ in range(3):
         for under_weather, taken in seconds.items():
             if under_weather:
                 bpy.ops.softground.add_weather()

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.benchmark
 FRAMES = 170
 SIZE = 12.0
 SKIN_VERTICES = 28_000
-TURNS = 4
-TIMED = np.random.default_rng(0).permutation(np.arange(2, FRAMES))[:60]
+TURNS = 3
+TIMED = np.random.default_rng(0).permutation(np.arange(2, FRAMES))[:40]
 
 
 def heavy_walker(scene, frames=FRAMES):
@@ -117,7 +117,7 @@ def dynamic_paint(scene, ground, brush):
     painter.ui_type = "BRUSH"
     with bpy.context.temp_override(object=brush, active_object=brush):
         bpy.ops.dpaint.type_toggle(type="BRUSH")
-    taken = times(scene, ground, np.arange(1, 61))
+    taken = times(scene, ground, np.arange(1, 31))
     ground.modifiers.remove(canvas)
     brush.modifiers.remove(painter)
     return taken
