@@ -39,9 +39,6 @@ SAMPLES = 2
 """Quarters along each side of a cell."""
 THINNEST = 0.2
 """Loose matter is laid where it is at least so thick, over its thickest."""
-THICKEST, LAYERS = 0.04, 3
-"""Loose matter is laid up to a thickness [m], and under what hovers over it, in so many goes; then up to twice that;
-then as high as what is cut is deep, ..."""
 ROUNDING = 1e-12
 """Heights below zero by no more than this are zero [m]."""
 EDGE, LEAST_DROP = 0.06, 0.06
@@ -50,11 +47,10 @@ PIECES, SEED = (0.09, 0.035), 431
 """Sizes of the pieces [m], and the number that their noise begins with."""
 MOST_OF_DROP = 0.7
 """Part of a drop that breaks off at most."""
-REACH = 0.04
-"""How far around a body loose matter is laid [m] (tried on the sample walk in snow)."""
-HIGHEST = 2 * THICKEST
-NEARBY = (REACH, THICKEST), (REACH, HIGHEST)
-"""... and twice as far around, as large bodies leave no room near them; then evenly on all that is looked at."""
+REACH, THICKEST, HIGHEST, LAYERS = 0.04, 0.04, 0.08, 3
+"""How far around a body loose matter is laid, and how thick (tried on the sample walk in snow) [m]: in so many goes,
+also under what hovers over it, then higher. Where large bodies leave no room for it, it is laid as high as the cut is
+deep, then twice as far around, then evenly on all that is looked at."""
 
 
 @dataclass(frozen=True)
@@ -230,9 +226,8 @@ class CarvedCells:
         """Lay heights (rows, columns) around where they were cut [m], not in bodies."""
         closed = self.closed | self.contact
         highest = bodies - self._standing_cells.max(axis=0) - TOLERANCE
-        remaining = float(thrown.sum())
-        pit = float((self.terrain - self.standing).max())
-        for reach, thickest in (*NEARBY, (REACH, pit), (2 * REACH, pit), (0.0, np.inf)):
+        remaining, pit = float(thrown.sum()), float((self.terrain - self.standing).max())
+        for reach, thickest in ((REACH, THICKEST), (REACH, HIGHEST), (REACH, pit), (2 * REACH, pit), (0.0, np.inf)):
             if remaining <= ROUNDING:
                 break
             laid = (_around(thrown, way, max(round(reach / self.cell_size), 1)) if reach else 1.0) * ~closed
