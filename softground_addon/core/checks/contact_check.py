@@ -65,8 +65,9 @@ def contact_check(character: CharacterLoads, skin: LowSkin, rise: Array, on_grou
         idle |= _first(name, rests[:, of_sole].any(axis=1) & ~on, np.where(_borders(on), longest, bears))
         aloft |= _first(name, on & (rise[:, of_sole] > ALOFT).all(axis=1), max(LONGEST * rate, LEAST_FRAMES))
         bears = motion.soles[number].bears
-        if bears is not None and name not in aloft:  # it lands before its skin does, or leaves after it
-            aloft |= _first(name, on & ~bears[motion.on_frames], longest)
+        if bears is not None and name not in aloft:  # it lands before its skin does, or leaves after it; at no ledge
+            is_low = ((rise[:, of_sole] > -ALOFT) & (rise[:, of_sole] < 2 * ALOFT)).any(axis=1)
+            aloft |= _first(name, on & is_low & ~bears[motion.on_frames], max(longest, LEAST_FRAMES + 1))
     least = max(RESTS * slow, LEAST_FRAMES)
     lengths = [sole.sole.length for sole in motion.soles]
     marks = [sole.landmark_positions()[motion.on_frames, :, :2] for sole in motion.soles]
