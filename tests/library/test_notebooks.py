@@ -45,6 +45,7 @@ def test_forces_of_a_walk_are_near_the_plates_in_twelve_lines(run):
     assert np.sqrt(np.mean(np.square(names["errors"]))) < 0.04 * 75.2 * 9.81
 
 
+@pytest.mark.slow
 def test_a_boot_sinks_less_in_harder_snow_and_about_as_deep_as_boots_do(run):
     """The medians of docs/ground_law.md are for 33 kPa: this boot has about as much."""
     depths = run("a_boot_in_five_snows")["depths"]

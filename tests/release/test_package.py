@@ -131,6 +131,7 @@ def run_installed(script, built, folder):
     return done
 
 
+@pytest.mark.slow
 def test_installing_enabling_and_disabling_it_prints_nothing(built, tmp_path):
     done = run_installed(INSTALL, built, tmp_path)
     assert done.stdout.replace('STATUS Installed "softground"\n', "") == ""  # Blender's own word

@@ -117,6 +117,7 @@ def test_soles_follow_foot_and_toe_bones_only(body):
     assert (toes[x > ball + 0.05 * body.foot.length] == 1).all()
 
 
+@pytest.mark.slow
 def test_a_bare_foot_stands_on_heel_ball_and_five_toes_but_not_on_its_arch():
     foot = Foot(0.26, 0.098, bare=True)
     body = Body(foot=foot)

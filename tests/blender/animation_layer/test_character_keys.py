@@ -141,6 +141,7 @@ def test_clearing_takes_the_response_off_a_character_that_has_left_the_list(scen
     assert fingerprints.of_object(armature) == before
 
 
+@pytest.mark.slow
 def test_without_influence_every_bone_is_where_it_was_to_the_last_bit(scene):
     armature = shots.walker(scene)
     character = set_up(armature)
@@ -170,6 +171,7 @@ def test_the_strength_scales_the_response_from_none_to_twice_without_a_bake(scen
         assert height - heights[0.0] == pytest.approx(strength * sunk, rel=0.02, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_baking_again_replaces_the_layer_and_reads_the_animation_without_it(scene):
     armature = shots.walker(scene)
     set_up(armature)
@@ -238,6 +240,7 @@ def test_prints_only_leaves_the_character_and_response_only_leaves_the_ground(sc
     assert fingerprints.of_mesh(scene.softground.ground.data) == ground
 
 
+@pytest.mark.slow
 def test_a_linked_rig_is_refused_with_a_remedy_and_untouched(scene, tmp_path):
     armature = responders.linked_walker(tmp_path)
     set_up(armature)
@@ -268,6 +271,7 @@ def test_an_override_of_a_linked_character_responds(scene, tmp_path):
     assert responders.world_matrices(scene, armature, ["hips", "foot.L"], [10, 40]) == pytest.approx(before, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_layer_notes_its_root_control_and_worst_frames(scene):
     armature = shots.walker(scene)
     set_up(armature)

@@ -77,6 +77,7 @@ def test_a_layer_multiplies_each_pose_by_its_keys(scene, walker):
         assert np.array_equal(local_poses(scene, walker), before)
 
 
+@pytest.mark.slow
 def test_layers_add_up_in_their_order_whichever_was_put_on_first(scene, walker):
     before = local_poses(scene, walker)
     sunk, sinking = random_layer(BONES, seed=1)
@@ -118,6 +119,7 @@ def test_it_lies_above_constraints_of_the_user_and_keeps_the_active_one(scene, w
     assert fingerprints.of_file() == fingerprint
 
 
+@pytest.mark.slow
 def test_a_key_set_after_a_bake_acts_at_once_and_is_the_users(scene, walker, tmp_path):
     action = walker.animation_data.action
     bpy.ops.softground.bake()
@@ -368,6 +370,7 @@ def test_made_keys_last_as_long_as_the_walk_and_the_bake(scene, walker, goes_on)
     assert shown(scene, walker, watched) == pytest.approx(poses, abs=1.5e-3)
 
 
+@pytest.mark.slow
 def test_made_keys_of_ik_controls_and_of_the_object_that_travels(scene):
     responders.with_ik()
     armature = bpy.context.view_layer.objects.active

@@ -230,6 +230,7 @@ def test_grounds_with_a_transform_take_the_same_prints(walk, transform):
         assert np.allclose(b["position"], a["position"], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_prints_do_not_depend_on_the_scenes_units(walk):
     """The same walk in a scene of centimetres gives the same prints, in metres."""
     metres = bake(walk).report

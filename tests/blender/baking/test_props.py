@@ -411,6 +411,7 @@ def test_contacts_are_added_from_what_is_selected(scene):
     assert {step["contact"] for step in report["steps"]} <= {"foot.L", "foot.R"}
 
 
+@pytest.mark.slow
 def test_the_hands_of_a_cartwheel_print_between_the_feet(scene):
     """Arms as long as legs: turned about its hips like a wheel, the figure lands on foot, hand, hand and foot."""
     armature = rigs.human(rigs.FAMILIES["blender"])

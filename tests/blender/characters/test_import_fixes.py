@@ -53,6 +53,7 @@ def metres(scene):
     return steps, mass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loose", slow_but_one([False, True]))
 @pytest.mark.parametrize("factor", slow_but_one([100.0, 0.01]))
 def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres, factor, loose):

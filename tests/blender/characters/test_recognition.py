@@ -238,6 +238,7 @@ def climber(riser: float) -> bpy.types.Object:
     return armature
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("riser", [0.17, -0.17])
 def test_both_feet_print_on_stairs_though_they_never_stand_on_the_same_step(scene, riser):
     scene.render.fps = 30

@@ -153,6 +153,7 @@ def test_an_envelope_of_another_size_makes_a_bake_outdated(scene, body):
     assert staleness._of_body(scene.objects, snapshot(scene).characters[0]) != before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [thick_soles, keyed, swollen])
 def test_a_shape_that_is_changed_makes_a_bake_outdated(scene, body, change):
     bpy.ops.softground.add_character()

@@ -77,6 +77,7 @@ def prints(scene):
     return moments, [step["max_depth_m"] for step in steps]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["worn", "worn from afar", "both controlled"])
 def test_shoes_on_a_rig_of_their_own_print_as_the_feet_of_the_body_do(scene, way):
     control, walker = controlled(scene) if way == "both controlled" else (None, shots.walker(scene, frames=30))

@@ -413,6 +413,7 @@ def test_a_deck_that_sets_off_or_stops_at_once_is_named_with_the_frame_and_the_w
     bake(short_walk)
 
 
+@pytest.mark.slow
 def test_feet_sink_into_prints_on_a_sailing_deck_as_on_a_still_one(short_walk):
     deck(short_walk)
     bake(short_walk, sink_feet=True)

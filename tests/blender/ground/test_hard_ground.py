@@ -110,6 +110,7 @@ def test_a_crate_that_is_not_listed_is_named_and_nothing_prints_below_it(opened_
     assert bytes_of(again.footprints) == bytes_of(result.footprints)
 
 
+@pytest.mark.slow
 def test_the_warning_has_a_button_that_adds_the_crate_and_the_bake_notices_when_it_moves(crate):
     scene = bpy.context.scene
     warnings, drawn = bake(scene).report["warnings"], []

@@ -39,6 +39,7 @@ def theirs(short_walk):
     return material
 
 
+@pytest.mark.slow
 def test_a_material_of_the_user_s_stays_until_the_look_is_asked_for(short_walk, theirs):
     bpy.ops.softground.bake()
     ground = short_walk.softground.ground

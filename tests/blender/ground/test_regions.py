@@ -105,6 +105,7 @@ def test_each_material_prints_as_its_preset_and_a_hard_one_not_at_all(four):
             assert step.rim_m3 == pytest.approx(other.rim_m3, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_steps_on_a_hard_material_are_in_the_events_and_heard(four, tmp_path):
     choose()
     table = bake(four).report["events"]
@@ -123,6 +124,7 @@ def test_steps_on_a_hard_material_are_in_the_events_and_heard(four, tmp_path):
             assert heard[at : at + 1000].max() > 3 * heard[max(0, at - 1500) : at - 500].max()
 
 
+@pytest.mark.slow
 def test_one_preset_in_all_slots_is_as_without_bit_for_bit(four):
     before = bake(four)
     assert "regions" not in before.report["inputs"]
@@ -178,6 +180,7 @@ def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     assert footprint.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_look_goes_over_each_material_by_its_preset_and_clear_gives_them_back(four):
     choose()
     ground = four.softground.ground

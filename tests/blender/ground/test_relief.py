@@ -64,6 +64,7 @@ def test_close_up_has_a_fine_mesh_with_the_tread_in_it_and_none_painted(baked):
     assert own_data.SOLE in baked["FINE"][4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [False, True])
 def test_close_up_is_fine_where_the_camera_comes_near_and_as_the_cells_elsewhere(scene, given):
     shots.walker(scene, frames=40)

@@ -70,6 +70,7 @@ def prints_on(ground):
     return record_of(ground).footprints
 
 
+@pytest.mark.slow
 def test_each_step_prints_on_the_ground_under_it(crate):
     scene = bpy.context.scene
     also(crate)
@@ -212,6 +213,7 @@ def test_clear_of_the_ground_shown_says_so_where_that_has_no_prints(crate):
     assert baked_ground.is_baked(crate)
 
 
+@pytest.mark.slow
 def test_the_depth_is_predicted_on_all_of_them(crate):
     scene = bpy.context.scene
     also(crate)
@@ -521,6 +523,7 @@ def test_live_mode_goes_on_when_another_of_its_grounds_is_shown_and_says_why_not
     assert not any(map(baked_ground.has_remains, (floor, crate, slab)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Field", CRATE])
 def test_live_mode_changes_none_of_its_grounds_while_one_is_in_edit_mode(crate, name):
     floor = bpy.context.scene.softground.ground
@@ -558,6 +561,7 @@ def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clea
     assert not any(map(baked_ground.has_remains, bpy.data.objects))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["script", "key"])
 def test_live_mode_leaves_grounds_alone_that_no_step_is_on_and_ends_with_one_that_is_deleted(crate, by):
     scene = bpy.context.scene
@@ -722,6 +726,7 @@ def edit(obj):
     bpy.ops.object.mode_set(mode="EDIT")
 
 
+@pytest.mark.slow
 def test_no_ground_is_written_where_another_one_cannot_be(crate):
     scene = bpy.context.scene
     also(crate)
@@ -838,6 +843,7 @@ def test_a_ground_that_is_moved_makes_the_prediction_outdated(crate):
         assert not analysis.known(scene)
 
 
+@pytest.mark.slow
 def test_a_ground_taken_out_of_the_list_is_named_where_feet_still_stand_on_it(crate):
     scene = bpy.context.scene
     also(crate)

@@ -325,6 +325,7 @@ def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_a
     assert alone(scene, tmp_path, 300) == seen[300]
 
 
+@pytest.mark.slow
 def test_a_changed_and_a_removed_key_count_at_once(opened):
     scene = opened()
     bpy.ops.softground.add_weather()
@@ -681,6 +682,7 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
     assert not [group for group in bpy.data.node_groups if weather_inputs.is_weather(group)]
 
 
+@pytest.mark.slow
 def test_the_panel_says_that_weather_only_covers_prints_where_there_is_some(opened):
     opened()
     panel = MagicMock()
@@ -744,6 +746,7 @@ def test_a_night_of_snow_is_one_slider(opened):
     assert options.weather_hours == pytest.approx(24.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("warm", [-10.0, 3.0])
 def test_snow_that_cannot_lie_is_as_much_as_can_fall(opened, warm):
     scene = opened()

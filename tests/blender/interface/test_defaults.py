@@ -105,6 +105,7 @@ def test_a_preset_that_says_no_more_sets_the_material_alone(scene, walker, tmp_p
     assert scene.softground.tread == pytest.approx(0.003)
 
 
+@pytest.mark.slow
 def test_cells_fit_the_shortest_sole_and_things_have_a_centimetre_at_most(scene, walker):
     options = scene.softground
     bpy.ops.softground.add_character()

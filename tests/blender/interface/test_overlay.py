@@ -104,6 +104,7 @@ def test_early_prints_cover_their_cells_without_gaps_and_lie_above_the_ground():
     assert corners[:, 2].min() >= 0.5 + step.cell_size
 
 
+@pytest.mark.slow
 def test_a_shot_that_is_forgotten_is_not_kept_by_what_was_drawn_of_it(short_walk):
     analysis.read(short_walk)
     shown = overlay._footfalls(analysis.known(short_walk))

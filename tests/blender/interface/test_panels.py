@@ -410,6 +410,7 @@ def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
     assert analysis.expected_depth(shot) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grounding", slow_but_one([False, True]))
 def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding):
     shot.softground.grounding.use = grounding
@@ -422,6 +423,7 @@ def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding
         assert analysis.expected_depth(shot) == expected
 
 
+@pytest.mark.slow
 def test_the_depth_to_expect_holds_on_through_another_look_of_a_baked_ground(shot):
     bpy.ops.softground.predict_depth()
     bpy.ops.softground.bake()
@@ -458,6 +460,7 @@ def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot
     assert analysis.known(shot) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("motion", "depth"), slow_but_one(itertools.product(["walk", "run", None], [2.0, 6.0])))
 def test_a_matched_depth_is_met_by_the_bake(scene, motion, depth):
     if motion:

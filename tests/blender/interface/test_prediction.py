@@ -91,6 +91,7 @@ def test_all_contacts_are_pressed_once_the_sliders_rest(shot, drawing):
     assert refined.depth == pytest.approx(sampled.depth, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_change_ends_what_is_refined(shot, drawing):
     analysis.read(shot)
     softer(shot)

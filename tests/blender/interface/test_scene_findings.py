@@ -42,6 +42,7 @@ def test_gravity_that_is_switched_off_or_weak_points_nowhere_else(short_walk):
     assert not bake(short_walk).report["self_check"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("away", "said"), [(4e3, False), (548e3, True)])
 def test_a_walk_so_far_from_the_origin_that_cells_are_rounded_away_is_said(short_walk, away, said):
     short_walk.softground.cell_size = 0.02

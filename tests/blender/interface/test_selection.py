@@ -106,6 +106,7 @@ def controlled(scene):
     return control, deform
 
 
+@pytest.mark.slow
 def test_of_a_control_rig_and_a_deform_rig_the_one_that_moves_the_skin_is_added(scene):
     control, deform = controlled(scene)
     assert walkers_of(scene.objects) == [deform]

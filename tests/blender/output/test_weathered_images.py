@@ -181,6 +181,7 @@ def test_hidden_weather_and_none_write_the_bake_alone(opened, tmp_path):
         np.testing.assert_array_equal(hidden[kind], none[kind])
 
 
+@pytest.mark.slow
 def test_an_export_leaves_nothing_behind(opened, tmp_path):
     scene = opened("mud", **weathered_shots.SOME)
 

@@ -133,6 +133,7 @@ def test_what_lies_under_a_sole_does_not_sway_and_without_wind_all_is_as_before(
     np.testing.assert_allclose(angles(grass), lying, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_wind_goes_with_the_bake_and_comes_with_the_next_weather(shot):
     grass = hair(roots())
     upright = state(grass)

@@ -58,6 +58,7 @@ def ages(scene):
     return age
 
 
+@pytest.mark.slow
 def test_the_age_of_prints_is_that_of_a_bake_at_every_frame(live_shot):
     shown = {}
     for frame in (30, 48, 21, 1):
@@ -151,6 +152,7 @@ def test_kept_prints_are_outdated_where_a_bake_would_carve_too(live_shot, softer
     assert bool(bake_report.stale_reasons(live_shot)) == outdated
 
 
+@pytest.mark.slow
 def test_kept_prints_are_pressed_with_the_settings_that_they_are_stamped_with(live_shot):
     """Also those that were changed a moment before, and had not shown yet."""
     material, options = live_shot.softground.material, live_shot.softground
@@ -201,6 +203,7 @@ def test_weather_acts_on_kept_prints_as_on_baked_ones_and_waits_for_them(live_sh
         assert np.array_equal(shown[False, frame], shown[True, frame])
 
 
+@pytest.mark.slow
 def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     live_shot.frame_set(live_shot.softground.frame_end)
     bpy.ops.softground.live(keep=True)
@@ -263,6 +266,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", slow_but_one(CHANGES))
 def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_shot, change):
     live_shot.frame_set(48)
@@ -480,6 +484,7 @@ def display_heights(scene):
     return ground_mesh.displayed_positions(display_mesh)[:, 2] - ground_mesh.rest_positions(display_mesh.data)[:, 2]
 
 
+@pytest.mark.slow
 def test_a_plane_of_four_corners_shows_the_prints_that_a_bake_gives_it(coarse_shot):
     bpy.ops.softground.live()
     coarse_shot.frame_set(48)

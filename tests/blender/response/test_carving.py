@@ -379,6 +379,7 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     assert (after - before) * CELL == pytest.approx([0.0, -0.1], abs=CELL)
 
 
+@pytest.mark.slow
 def test_a_bake_is_refused_that_carving_makes_too_long(scene, monkeypatch):
     walker(scene, **DEEP)
     limits = "softground_addon.core.loads.cell_limits"

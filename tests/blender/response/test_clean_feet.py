@@ -279,6 +279,7 @@ def test_a_contact_is_locked_as_a_whole_on_the_rig(floor_walk):
     assert np.abs(sole.transforms[during, 0, :3, :3] - sole.transforms[during.start, 0, :3, :3]).max() < 5e-3
 
 
+@pytest.mark.slow
 def test_a_contact_without_strength_is_left_as_it_was_animated(floor_walk):
     spoil(floor_walk)
     hold = lock_contact(floor_walk, "FLAT", strength=0.0)
@@ -386,6 +387,7 @@ def test_what_goes_on_below_is_no_shin_on_which_a_leg_ends(scene):
     assert legs_on_shins(shots.walker(scene), ["shin.L", "shin.R"]) == {}
 
 
+@pytest.mark.slow
 def test_legs_that_end_in_shins_are_keyed_by_their_bones_and_not_by_ik_that_cannot_turn_them(scene):
     armature, numbers = without_feet(scene)
     legs = legs_on_shins(armature, [numbers["shin.L"], numbers["shin.R"]])

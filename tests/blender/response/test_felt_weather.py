@@ -183,6 +183,7 @@ def test_keyed_weather_is_felt_as_it_is_at_the_time_of_each_step(opened):
     assert "The settings have changed" in bake_report.stale_reasons(opened)
 
 
+@pytest.mark.slow
 def test_an_edit_presses_again_in_the_weather_of_the_bake(opened):
     set_to(opened, **SNOWFALL)
     opened.softground.steps_feel_weather = True

@@ -154,6 +154,7 @@ def test_feet_sink_by_themselves(first_walk):
     assert bake_report.stale_reasons(first_walk)
 
 
+@pytest.mark.slow
 def test_a_rig_that_takes_no_layer_is_named_in_a_line_and_prints_all_the_same(scene, tmp_path):
     armature = responders.linked_walker(tmp_path)
     scene = bpy.context.scene

@@ -13,6 +13,7 @@ from tests.tiers import slow_but_one
 FINE = {"vertices": 150, "size": 5.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", own_data.ATTRIBUTES)
 def test_attributes_of_the_users_that_a_bake_would_need_are_named_and_stay(short_walk, name):
     ground = field(short_walk, **FINE)
@@ -46,6 +47,7 @@ def test_properties_of_the_users_that_a_bake_would_need_are_named_and_stay(short
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_what_the_user_makes_after_the_bake_under_such_a_name_stays_and_is_told_of(short_walk):
     short_walk.softground.shape_keys = False  # without which a bake needs fewer attributes
     ground = field(short_walk, **FINE)

@@ -262,6 +262,7 @@ def test_a_mesh_that_can_be_no_sole_is_named_with_the_remedy(shot, capsys, make,
     assert re.search(said, line)
 
 
+@pytest.mark.slow
 def test_a_linked_mesh_presses_by_its_full_name(shot, tmp_path):
     folder, plain = shot
     name = plain["steps"][2]["id"]

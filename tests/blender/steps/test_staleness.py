@@ -445,6 +445,7 @@ def let_cane_follow(_scene):
     cane.constraints.new("COPY_LOCATION").target = bpy.data.objects["Walker"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "messages"),
     [

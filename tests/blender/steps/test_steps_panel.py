@@ -198,6 +198,7 @@ def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
     assert not record.load(stored(baked)).edits
 
 
+@pytest.mark.slow
 def test_an_edit_keeps_the_look_that_the_bake_was_made_with(baked):
     options = baked.softground
     options.relief, options.cell_size = "FINE", 0.01
