@@ -98,7 +98,6 @@ def misses(animal: Animal) -> list[str]:
     return seen(animal).wrong
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "count", "right"),
     [

@@ -127,7 +127,6 @@ def session(chance, folder):
     return done
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "numbers",
     [

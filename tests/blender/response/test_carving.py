@@ -89,7 +89,6 @@ def in_the_ground(footprints, places, frame, cell=CELL):
     return np.min([rim - compression for compression, rim in around], axis=0) - z
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("snow", "cell", "coarseness"),
     [
@@ -150,7 +149,6 @@ def crawler(scene):
     return test_crawling.crawler(rigs.FAMILIES["mixamo"])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mover", "snow"),
     [

@@ -33,7 +33,6 @@ def straightest_knees(scene, steps):
     return np.array(heights)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("depth", "youngs_modulus", "bounce", "flexion"),
     [

@@ -307,7 +307,6 @@ def fifty(first, *marks):
     return pytest.param(range(first, first + 50), marks=[*marks, pytest.mark.timeout(3600)])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "numbers",
     [
