@@ -28,6 +28,7 @@ def test_a_catalogue_holds_what_the_interface_shows(addon, language):
     assert strings.faults(language) == {"missing": [], "superfluous": [], "other names": []}
 
 
+@pytest.mark.slow
 def test_the_interface_shows_names_tooltips_labels_presets_and_templates(addon):
     shown = strings.shown()
     for text in (

@@ -163,9 +163,11 @@ class TestInBlender:
         sampled = run(sample_character(scene, armature, mapping, mass=dog.mass, frames=range(120)))
         return estimate_loads(sampled, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
+    @pytest.mark.slow
     def test_the_add_on_takes_it_for_an_animal(self, loads):
         assert loads.motion.four_legged
 
+    @pytest.mark.slow
     def test_the_add_on_finds_one_body_weight_on_paws_that_bear_in_turn(self, loads, gait):
         vertical = vertical_in_body_weights(loads)
         strides = whole_strides(loads, gait.stride_time(Dog()))

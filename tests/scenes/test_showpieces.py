@@ -74,6 +74,7 @@ def test_the_dance_steps_on_the_beat_with_either_foot():
         assert fall.strike / BEAT == pytest.approx(round(fall.strike / BEAT), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("move", "frames", "steps"), [(kick, 150, [1, 2]), (dance, 480, [9, 9])])
 def test_the_add_on_finds_every_step_and_one_body_weight(scene, move, frames, steps):
     loads = loads_in_blender(scene, Body(), move(Body(), frames, 60.0))

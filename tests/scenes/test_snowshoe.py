@@ -61,6 +61,7 @@ def test_a_plate_is_closed_and_several_times_as_large_as_a_shoe(scene):
     assert np.einsum("ij,ij->", corners.mean(axis=1), normals) > 0  # outward
 
 
+@pytest.mark.slow
 def test_the_knees_bend_to_lift_them(walker):
     _, motion = walker
     for side in SIDES:

@@ -157,6 +157,7 @@ def test_without_influence_every_bone_is_where_it_was_to_the_last_bit(scene):
     assert responders.world_matrices(scene, armature, bones, frames) == pytest.approx(before, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_strength_scales_the_response_from_none_to_twice_without_a_bake(scene):
     armature = shots.walker(scene)
     character = set_up(armature)
@@ -219,6 +220,7 @@ def test_whatever_the_users_nla_is_like_feet_sink_and_clear_gives_it_back(scene,
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_outside_its_frames_the_layer_does_nothing(scene):
     armature = shots.walker(scene)
     set_up(armature)
@@ -375,6 +377,7 @@ def test_slowing_down_keeps_the_users_own_time_and_is_the_same_twice(scene, mapp
     assert render.frame_map_new / render.frame_map_old == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_cyclic_keys_go_on_beyond_their_end_as_before(scene):
     armature = shots.walker(scene)
     set_up(armature)

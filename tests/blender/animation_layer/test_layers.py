@@ -161,6 +161,7 @@ def test_cleaned_feet_also_sink_and_an_earlier_bake_is_outdated_by_the_cleaning(
     assert bake_report.stale_reasons(scene)
 
 
+@pytest.mark.slow
 def test_the_copy_of_a_rig_keeps_its_layer_when_that_of_the_rig_is_cleared(scene, walker):
     bpy.ops.softground.bake()
     copy = walker.copy()
@@ -219,6 +220,7 @@ def test_without_its_helper_the_walk_is_as_it_was_and_clear_takes_the_rest_away(
     assert fingerprints.of_object(walker) == bytes_before
 
 
+@pytest.mark.slow
 def test_renamed_rigs_bones_and_actions_play_on_and_clear(scene, walker):
     bpy.ops.softground.bake()
     poses = shown(scene, walker)
@@ -229,6 +231,7 @@ def test_renamed_rigs_bones_and_actions_play_on_and_clear(scene, walker):
     assert not any(bone.constraints for bone in walker.pose.bones)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", [False, True], ids=["appended", "linked"])
 def test_a_layer_comes_along_without_the_add_on(scene, walker, tmp_path, link):
     bpy.ops.softground.bake()

@@ -204,6 +204,7 @@ def test_a_bake_that_is_stopped_half_way_changes_nothing(walk, stage):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transform", slow_but_one(["tilted", "scaled", "parented", "moved"]))
 def test_grounds_with_a_transform_take_the_same_prints(walk, transform):
     """A level field looks the same however its object is turned and scaled, and so do the prints."""
@@ -417,6 +418,7 @@ def test_changing_the_choice_of_detail_moves_the_bake(walk):
     assert "Field Trail" not in bpy.data.objects
 
 
+@pytest.mark.slow
 def test_what_is_known_of_every_step_is_let_go_before_the_ground_is_written(walk, monkeypatch):
     def alive():
         return [thing for thing in gc.get_objects() if isinstance(thing, CharacterLoads)]

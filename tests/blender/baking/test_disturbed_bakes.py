@@ -193,6 +193,7 @@ def test_whatever_is_made_of_the_bakes_data_clearing_gives_the_ground_back(scene
     assert not field.hide_viewport
 
 
+@pytest.mark.slow
 def test_undisturbed_positions_that_were_converted_are_only_passed_over(scene, baked):
     now = mesh_arrays.positions(baked.data)
     retype(ground_mesh.REST, "FLOAT", "POINT")(baked)
@@ -234,6 +235,7 @@ def test_the_ground_is_shown_again_where_its_fine_copy_was_deleted(scene):
     assert fingerprints.of_file()["objects"]["Field"] == before["objects"]["Field"]
 
 
+@pytest.mark.slow
 def test_a_duplicate_of_the_fine_copy_is_the_users_own(scene):
     shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()

@@ -366,6 +366,7 @@ def test_a_rig_that_is_deleted_while_its_feet_are_looked_for_is_named(scene):
     assert not scene.softground.characters
 
 
+@pytest.mark.slow
 def test_a_tick_asks_for_what_it_reads_without_walking_over_all_objects(scene):
     prepare(scene, "coarse")
     fill(scene, 10_000)

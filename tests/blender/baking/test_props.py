@@ -50,6 +50,7 @@ def heights(scene):
     return positions
 
 
+@pytest.mark.slow
 def test_a_dropped_ball_bakes_from_one_click(scene):
     key_path(ball(), dropped_path(0.1, 0.2, 2.5))
     assert bpy.ops.softground.add_character() == {"FINISHED"}
@@ -392,6 +393,7 @@ def test_a_cane_on_the_hand_prints_with_its_tip_and_carries_its_share(scene):
     assert tip["area_m2"] == pytest.approx(np.pi * 0.015**2, rel=0.1)
 
 
+@pytest.mark.slow
 def test_contacts_are_added_from_what_is_selected(scene):
     armature = shots.walker(scene, frames=20)
     add_character(scene, armature)

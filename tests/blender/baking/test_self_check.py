@@ -21,6 +21,7 @@ def on_own_ground(scene, **values):
     return ground
 
 
+@pytest.mark.slow
 def test_a_walk_with_a_skin_says_nothing_on_a_created_and_on_an_own_ground(short_walk):
     assert bake(short_walk).report["self_check"] == []
     bpy.ops.softground.clear_bake()
@@ -123,6 +124,7 @@ def bobbing(scene, height, path, *, skin=True):
     bpy.ops.softground.add_character()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("skin", [True, False])
 @pytest.mark.parametrize(("bob", "period"), [(0.1, 1.5), (0.04, 1.0)])
 def test_a_body_that_hovers_is_said_to_and_leaves_no_print_where_it_dips(scene, bob, period, skin):

@@ -279,6 +279,7 @@ def test_weather_washes_marks_at_once_and_removing_it_brings_them_back(scene):
     assert (values(at(scene, 84), "mass") == before).all()
 
 
+@pytest.mark.slow
 def test_marks_of_another_bake_follow_the_weather_that_is_there(scene):
     weather_on(scene, Rain=20.0, Time_Scale=600.0)
     scene.softground.carried = 0.8
@@ -441,6 +442,7 @@ def test_soles_that_start_dirty_leave_more_and_outdate_the_bake(scene, baked):
     assert bake_report.stale_reasons(scene) == ()
 
 
+@pytest.mark.slow
 def test_soles_that_start_dirty_with_another_kind_leave_it_beside_sand_and_outdate_the_bake(scene):
     character = scene.softground.characters[0]
     scene.softground.material.surface, character.dirty_soles = "sand", 1.0  # which does not stick
@@ -455,6 +457,7 @@ def test_soles_that_start_dirty_with_another_kind_leave_it_beside_sand_and_outda
     assert bake_report.stale_reasons(scene) == ()
 
 
+@pytest.mark.slow
 def test_soles_take_up_what_wets_hard_ground_and_a_bake_without_it_is_outdated(scene):
     options = scene.softground
     listed(box(scene, "Path", 0.002, y=(-4.5, LOW - 0.3), bottom=-0.5))
@@ -532,6 +535,7 @@ def test_marks_that_the_user_has_changed_stay_as_they_are_with_edits_of_steps(sc
     assert (state_of(obj)[1] == before[1]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change", [StepEdit(move_m=(0.3, 0.1)), StepEdit(scale=1.3), StepEdit(turn_deg=30.0), StepEdit(shift_frames=40.0)]
 )

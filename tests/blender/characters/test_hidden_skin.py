@@ -36,6 +36,7 @@ def cube(scene, name, *, parent, bone=""):
     return obj
 
 
+@pytest.mark.slow
 def test_a_body_that_is_hidden_from_renders_prints_as_it_does_when_it_is_shown(walk):
     scene, _, body = walk
     shown, _ = prints_of(scene)

@@ -37,6 +37,7 @@ def let_blender_evaluate(armature):
     armature.constraints.new("LIMIT_LOCATION")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shots.MOTION_FILES)
 def test_joints_equal_independent_forward_kinematics_of_the_motion_file(scene, name):
     armature = shots.import_motion(name)

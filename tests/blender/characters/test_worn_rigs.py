@@ -157,6 +157,7 @@ def hung(obj, rig, bone):
     obj.matrix_basis = Matrix.Identity(4)
 
 
+@pytest.mark.slow
 def test_shoes_that_hang_on_the_bones_of_feet_are_the_body_that_stands_on_them_and_a_staff_is_a_prop(scene):
     walker = shots.walker(scene, frames=30)
     body = walker.children[0]

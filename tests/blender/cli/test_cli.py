@@ -23,6 +23,7 @@ def run(shot, *options):
     return cli.run_in_blender(["bake", "--progress", "none", *map(str, options)])
 
 
+@pytest.mark.slow
 def test_it_sets_up_bakes_saves_and_reports_by_itself(shot, tmp_path):
     report, baked = tmp_path / "report.json", tmp_path / "baked.blend"
     original = shot.read_bytes()

@@ -295,6 +295,7 @@ def test_hard_steps_are_heard_from_where_they_are_in_the_world(short_walk, tmp_p
         assert apart < (1e-3 if where == "sails" else 1.0), "single precision"
 
 
+@pytest.mark.slow
 def test_a_walk_on_the_spot_on_a_belt_prints_as_the_walk_that_goes_ahead(scene):
     armature = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
     scene.softground.cell_size = 0.02

@@ -159,6 +159,7 @@ def test_paint_is_seen_through_modifiers(walk):
     assert not depth(ground).any()
 
 
+@pytest.mark.slow
 def test_a_name_that_is_not_there_or_of_another_kind_is_refused_with_the_remedy(walk):
     ground = walk.softground.ground = plane(walk)
     walk.softground.painted.stiffness = "gone"

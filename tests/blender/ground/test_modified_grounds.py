@@ -132,6 +132,7 @@ def test_live_prints_show_where_modifiers_would_undo_them(short_walk, shrinkwrap
         bpy.ops.softground.live()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", slow_but_one(["SUBSURF", "DISPLACE", "SOLIDIFY", "SMOOTH", "WAVE"]))
 def test_modifiers_that_let_prints_through_stay_on_the_ground(short_walk, kind):
     ground = field(short_walk, vertices=200, size=6.0)

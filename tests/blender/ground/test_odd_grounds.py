@@ -172,6 +172,7 @@ def test_a_scatter_that_renders_only_is_in_the_way_in_no_viewport(short_walk):
     assert (ground.show_instancer_for_viewport, ground.show_instancer_for_render) == (True, False)
 
 
+@pytest.mark.slow
 def test_what_collides_with_a_ground_collides_with_its_fine_copy(short_walk):
     ground = field(short_walk)
     ground.modifiers.new("Collision", "COLLISION")

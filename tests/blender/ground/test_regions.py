@@ -153,6 +153,7 @@ def test_a_bake_is_outdated_by_a_preset_or_a_face_that_is_of_another_material(fo
     assert bake_report.stale_reasons(four) == ("The modifiers of 'Field', or what is painted on it, have changed",)
 
 
+@pytest.mark.slow
 def test_a_face_attribute_counts_in_place_of_the_materials(four):
     choose()
     mesh = four.softground.ground.data
@@ -168,6 +169,7 @@ def test_a_face_attribute_counts_in_place_of_the_materials(four):
     assert bytes_of(bake(four).footprints) == bytes_of(expected)
 
 
+@pytest.mark.slow
 def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     choose()
     bake(four)
@@ -295,6 +297,7 @@ def test_a_slot_without_a_material_of_one_s_own_is_refused(four):
         bpy.ops.softground.region_preset(slot=9, preset="mud")
 
 
+@pytest.mark.slow
 def test_what_the_record_says_is_read_back(four):
     choose()
     bake(four)
@@ -501,6 +504,7 @@ def test_weather_of_one_region_is_one_group_and_goes_with_the_bake(four):
     assert not tables
 
 
+@pytest.mark.slow
 def test_soles_carry_what_sticks_onto_a_hard_material(four):
     choose()
     four.softground.marks = True

@@ -287,6 +287,7 @@ def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(
     assert not record_of(floor).edits
 
 
+@pytest.mark.slow
 def test_steps_are_edited_as_well_once_another_ground_was_listed(crate):
     scene = bpy.context.scene
     bake(scene)
@@ -336,6 +337,7 @@ def test_a_ground_that_is_shown_brings_what_is_set_for_it_and_takes_it_back(crat
     assert (other.preset, other.surface, other.under, other.painted[2]) == ("Mud", "mud", "NEVER", "Mine")
 
 
+@pytest.mark.slow
 def test_cover_adds_a_ground_and_the_first_stays(crate):
     scene = bpy.context.scene
     options, floor = scene.softground, scene.softground.ground
@@ -421,6 +423,7 @@ def lowest_steps(*grounds):
     return [(ground, max(step.max_depth_m for step in prints_on(ground))) for ground in grounds]
 
 
+@pytest.mark.slow
 def test_live_mode_presses_a_ground_again_when_its_material_changes_and_leaves_the_others(crate):
     scene = bpy.context.scene
     item, floor = also(crate), scene.softground.ground
@@ -545,6 +548,7 @@ def test_live_mode_changes_none_of_its_grounds_while_one_is_in_edit_mode(crate, 
     assert len(bpy.context.scene.softground.printed) == 0
 
 
+@pytest.mark.slow
 def test_live_mode_notes_its_grounds_so_that_none_keeps_prints_that_nothing_clears(crate, tmp_path):
     options = bpy.context.scene.softground
     also(crate)
@@ -790,6 +794,7 @@ def test_what_happens_on_hard_ground_is_with_the_first_ground_that_has_steps(cra
     assert baked_ground.events_of(crate) == as_second
 
 
+@pytest.mark.slow
 def test_edits_that_have_lost_their_step_stay_beside_a_ground_without_steps(crate):
     scene = beside_a_far_field(crate)
     lost = {"Walker/foot.L@900.0": StepEdit(mute=True)}
@@ -911,6 +916,7 @@ def test_clear_bake_is_off_where_only_grounds_that_left_the_list_have_prints(cra
     assert not bpy.ops.softground.clear_unlisted.poll()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_listed", [True, False])
 def test_a_printed_ground_that_is_deleted_is_forgotten_at_once_and_undo_brings_both_back(crate, is_listed):
     scene, inner = bpy.context.scene, bpy.data.collections.new("Inner")
@@ -986,6 +992,7 @@ def test_the_later_bake_is_heard_whatever_grounds_are_called_by_then_and_whichev
     assert bake_report.baked_grounds(options) == [crate]
 
 
+@pytest.mark.slow
 def test_bakes_of_other_times_of_the_shot_are_all_heard(crate):
     scene = bpy.context.scene
     options, floor = scene.softground, scene.softground.ground
@@ -1026,6 +1033,7 @@ def test_a_rig_that_was_renamed_between_two_bakes_is_heard_once(crate, tmp_path,
     assert heard_steps(scene, tmp_path, monkeypatch) == alone
 
 
+@pytest.mark.slow
 def test_of_an_older_bake_all_is_heard_that_the_later_one_does_not_have(crate, tmp_path, monkeypatch):
     scene = bpy.context.scene
     options, floor = scene.softground, scene.softground.ground

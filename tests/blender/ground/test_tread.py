@@ -90,6 +90,7 @@ def test_prints_of_all_paws_head_where_their_toes_point(prints_of_a_dog):
     assert np.cos(off).min() > np.cos(np.radians(5.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", ["BARE", "IMAGE", "SHOES"])
 def test_soles_of_another_kind_are_not_shown_with_the_bars_of_shoes(ground, scene, pattern):
     scene.softground.tread_pattern = pattern

@@ -408,6 +408,7 @@ def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
     assert not [group for group in bpy.data.node_groups if group.name.startswith(weather_inputs.GROUP)]
 
 
+@pytest.mark.slow
 def test_sliders_change_nothing_that_is_stored(opened):
     scene = opened("sand")
     bpy.ops.softground.add_weather()
@@ -420,6 +421,7 @@ def test_sliders_change_nothing_that_is_stored(opened):
     assert contents(carrier(scene).data) == before
 
 
+@pytest.mark.slow
 def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     scene = opened()
     ground = carrier(scene)
@@ -438,6 +440,7 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
         assert holder.path_resolve(path) == values[name]
 
 
+@pytest.mark.slow
 def test_the_final_mesh_stands_under_the_weather_of_the_last_frame(opened):
     scene = opened()
     scene.frame_end = 200
@@ -641,6 +644,7 @@ def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon):
     assert fresh[0] != fresh[1]
 
 
+@pytest.mark.slow
 def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened):
     scene = opened()
     bpy.ops.softground.clear_bake()
@@ -725,6 +729,7 @@ def test_hollows_read_compression_against_what_can_be_packed(densest, deepest):
     assert regions.pressable[0] == pytest.approx(deepest)
 
 
+@pytest.mark.slow
 def test_a_night_of_snow_is_one_slider(opened):
     scene = opened()
     bpy.ops.softground.add_weather()

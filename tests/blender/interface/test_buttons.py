@@ -81,6 +81,7 @@ def test_each_button_works_in_a_window_and_once_more_where_the_shot_is_known(sce
         assert (result, ticks > 3) == ({"FINISHED"}, True), name
 
 
+@pytest.mark.slow
 def test_live_mode_starts_ends_and_is_kept_in_a_window(scene, press):
     walker(scene, frames=24)
     scene.softground.cell_size = 0.03
@@ -113,6 +114,7 @@ def test_each_button_that_changes_steps_works_in_a_window(scene, press, steps):
     assert not baked_ground.edits_of(scene.softground.ground)
 
 
+@pytest.mark.slow
 def test_what_a_dialog_or_the_mouse_changed_of_a_step_is_pressed_in_a_window(scene, monkeypatch, press, steps):
     monkeypatch.setattr(step_editing.SOFTGROUND_OT_change_step, "_in_dialog", True)
     state.edits = moved = {steps[1]: StepEdit(move_m=(0.1, 0.0))}

@@ -73,6 +73,7 @@ def test_live_mode_shows_the_cells_of_each_sole_that_touches_as_the_bake_does(sc
         assert len(baked_rim)
 
 
+@pytest.mark.slow
 def test_the_cells_of_another_bake_are_shown_once_there_is_one(scene):
     walker(scene, frames=40)
     bpy.ops.softground.add_character()

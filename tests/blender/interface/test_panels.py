@@ -436,6 +436,7 @@ def test_the_depth_to_expect_holds_on_through_another_look_of_a_baked_ground(sho
     assert analysis.expected_depth(shot) < in_snow
 
 
+@pytest.mark.slow
 def test_the_depth_to_expect_holds_on_through_live_mode(shot):
     bpy.ops.softground.predict_depth()
     known = analysis.known(shot)
@@ -446,6 +447,7 @@ def test_the_depth_to_expect_holds_on_through_live_mode(shot):
     assert analysis.known(shot).contacts is known.contacts
 
 
+@pytest.mark.slow
 def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot):
     bpy.ops.softground.create_ground()
     ground = shot.softground.ground

@@ -49,6 +49,7 @@ def wrong(scene, tmp_path):
     return bpy.context.scene
 
 
+@pytest.mark.slow
 def test_the_remedies_that_a_warning_names_are_in_it_and_in_the_panel(wrong):
     assert analysis.known(wrong) is None
     popup = MagicMock()
@@ -76,6 +77,7 @@ def test_remedies_stay_in_the_panel_while_their_finding_stands(wrong):
     assert in_panel(wrong) == {}
 
 
+@pytest.mark.slow
 def test_undo_brings_remedies_back_with_their_finding(wrong):
     bpy.ops.ed.undo_push(message="Opened")
     bpy.ops.softground.walk_ahead(character="Walker")
@@ -105,6 +107,7 @@ def test_a_mass_that_is_too_large_is_in_the_panel_once_whichever_character_is_ch
         assert owners == [options.characters[0]] * active
 
 
+@pytest.mark.slow
 def test_a_remedy_is_for_the_character_that_its_warning_names(scene):
     first = on_the_spot(scene, walk(Body(), Gait(), FRAMES, 24), Gait().speed, 24, hips_held=False)
     second = walker(scene, frames=FRAMES)

@@ -36,6 +36,7 @@ def cube(scene):
     return bpy.context.active_object
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["cube", "camera", "empty", "nothing"])
 def test_what_is_no_rig_and_does_not_move_stands_for_the_only_rig_that_does(scene, cube, what):
     walker = shots.walker(scene)

@@ -67,6 +67,7 @@ def assert_stands_as_recorded(ground, frame, world, tolerance=TOLERANCE):
     assert np.abs(world[:, 2] - sample.display).max() <= tolerance + 2e-6
 
 
+@pytest.mark.slow
 def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
     exports.export_point_cache(ground, path, *FRAMES)
@@ -169,6 +170,7 @@ def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(sce
     assert [path.name for path in tmp_path.iterdir()] == ["ground.abc"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["abc", "usdc", "obj"])
 def test_the_export_is_the_only_file_whatever_the_world_looks_like(scene, ground, tmp_path, kind):
     """Blender's USD exporter makes the world a light, with an image of its colour in a folder beside the file."""
@@ -194,6 +196,7 @@ def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_pa
     assert (scene.frame_start, scene.frame_end, scene.frame_current_final) == (*frames, 7.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("export", [exports.export_point_cache, exports.export_alembic, exports.export_usd])
 def test_progress_counts_the_frames_that_are_written(scene, ground, tmp_path, export, monkeypatch):
     shown, before = [], list(bpy.app.handlers.frame_change_post)
@@ -219,6 +222,7 @@ def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, k
     assert len(copy.data.vertices) == len(display_mesh.data.vertices)
 
 
+@pytest.mark.slow
 def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_written(scene, ground, tmp_path):
     hidden = bpy.data.collections.new("Set")
     scene.collection.children.link(hidden)
@@ -247,6 +251,7 @@ def test_the_final_mesh_leaves_no_shape_keys_behind(scene, ground, tmp_path):
     assert len(bpy.data.shape_keys) == keys
 
 
+@pytest.mark.slow
 def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):
     resolution = 512
     paths = image_exports.export_images(ground, tmp_path, 24, 25, units=settings.units_of(scene), resolution=resolution)

@@ -110,6 +110,7 @@ def test_a_file_that_is_not_saved_is_asked_for(scene):
         bpy.ops.softground.make_sound()
 
 
+@pytest.mark.slow
 def test_the_command_line_writes_it_in_stereo_from_the_camera(scene, tmp_path):
     assert cli.run_in_blender(["export", "--format", "wav", "--stereo"]) == cli.EXIT_BAD_INPUT  # there is no camera
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

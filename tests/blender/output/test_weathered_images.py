@@ -152,6 +152,7 @@ def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):
         np.testing.assert_allclose(of_linked[kind], weathered[kind], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_keyed_weather_and_remapped_time_are_those_of_the_scene(opened, tmp_path):
     scene = opened("snow", **{"Time Scale": 900.0, "Temperature": -5.0})
     display_mesh = baked_ground.display_mesh_of(scene.softground.ground)

@@ -777,6 +777,7 @@ def inside_shoes(figure, points):
     return inside
 
 
+@pytest.mark.slow
 def test_hardly_a_blade_is_inside_a_shoe_that_stands(shot):
     """While both feet bear, counted on the skin; a foot in the air meets a few more."""
     grass = hair(roots(3000))

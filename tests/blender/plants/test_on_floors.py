@@ -81,6 +81,7 @@ def test_pebbles_on_a_hard_floor_roll_aside_and_blades_bend_under_the_soles(open
     np.testing.assert_allclose(blades(pebbles)[0] - place, moved, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_record_has_steps_on_floors_without_heights_and_stores_them(opened_as):
     scene = opened_as(with_a_region)
     assert bpy.ops.softground.bake() == {"FINISHED"}

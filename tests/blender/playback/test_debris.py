@@ -323,6 +323,7 @@ def test_debris_goes_with_the_ground_and_has_its_origin_so_that_no_line_runs_bet
     assert (obj.matrix_world.translation - ground.matrix_world.translation).length < 1e-5
 
 
+@pytest.mark.slow
 def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -370,6 +371,7 @@ def test_off_costs_nothing_and_takes_the_older_away(scene):
     assert not [collection for collection in bpy.data.collections if collection.name.startswith("SoftGround")]
 
 
+@pytest.mark.slow
 def test_an_artists_own_shapes_and_wind_stay_with_the_next_bake(scene):
     leaves = bpy.data.collections.new("Leaves")
     leaves.objects.link(bpy.data.objects.new("Leaf", bpy.data.meshes.new("Leaf")))
@@ -466,6 +468,7 @@ def test_where_the_ground_was_deleted_no_debris_hangs_in_the_air_and_the_next_ba
     assert bake_report.stale_reasons(scene) == ()
 
 
+@pytest.mark.slow
 def test_where_the_copy_that_shows_the_prints_was_deleted_no_debris_hangs_in_the_air(scene):
     bpy.ops.softground.clear_bake()
     scene.softground.detail = "ALWAYS"
@@ -543,6 +546,7 @@ print("shown", sum(len(obj.data.points) if obj.type == "POINTCLOUD" else 1 for o
 """
 
 
+@pytest.mark.slow
 def test_it_plays_without_the_add_on_and_without_scripts(baked, scene):
     scene.frame_set(20)
     ran = subprocess.run([sys.executable, "-c", COUNT, str(baked[0])], capture_output=True, text=True, check=True)

@@ -508,6 +508,7 @@ def test_discarding_live_prints_takes_the_fine_copy_away(coarse_shot):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_kept_live_prints_stay_on_the_fine_copy_until_they_are_cleared(coarse_shot):
     before = fingerprints.of_file()
     bpy.ops.softground.live()
@@ -530,6 +531,7 @@ def test_live_mode_on_a_coarse_ground_that_is_to_stay_coarse_says_what_to_do(coa
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_a_coarse_ground_deleted_in_live_mode_leaves_no_prints_behind(coarse_shot):
     bpy.ops.softground.live()
     coarse_shot.frame_set(40)

@@ -409,6 +409,7 @@ def test_a_bake_from_before_carving_is_still_current(scene):
     assert not staleness.reasons(scene.softground.ground, scene.objects, wanted)
 
 
+@pytest.mark.slow
 def test_down_to_the_ankle_a_bake_is_what_it_is_without(scene):
     walker(scene)
     bake(scene)  # which makes the ground

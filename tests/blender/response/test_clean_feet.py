@@ -161,6 +161,7 @@ def test_the_panel_lists_no_gap_that_the_summary_does_not_know(floor_walk):
     assert listed < cleaned.feet["after"]["Walker"]["float"]["max"] + 0.1
 
 
+@pytest.mark.slow
 def test_clear_bake_gives_the_bytes_back(floor_walk):
     spoil(floor_walk)
     before = fingerprints.of_file()
@@ -180,6 +181,7 @@ def test_what_is_cancelled_leaves_everything_as_it_was(floor_walk):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 def test_controls_of_ik_legs_are_cleaned(scene):
     responders.with_ik()
     bpy.ops.softground.add_character()
@@ -269,6 +271,7 @@ def sole_in_contact(scene, hold):
     return moved.soles[number], slice(starts[at], ends[at])
 
 
+@pytest.mark.slow
 def test_a_contact_is_locked_as_a_whole_on_the_rig(floor_walk):
     spoil(floor_walk)
     hold = lock_contact(floor_walk, "FULL")

@@ -86,6 +86,7 @@ def check(scene, name):
     assert measures["clean"][2] < measures["plain"][2], "less jerk of the knees"
 
 
+@pytest.mark.slow
 def test_a_walk_that_slides_jerks_less_than_under_the_plain_lock(floor_walk):  # noqa: F811
     spoil(floor_walk, floats=0.0)
     check(floor_walk, "spoilt walk")

@@ -152,6 +152,7 @@ def link(library, **names):
     return linked
 
 
+@pytest.mark.slow
 def test_a_linked_rig_is_baked_and_not_changed(library, capfd):
     rig = link(library, objects="Walker").objects[0]
     bpy.context.scene.collection.objects.link(rig)

@@ -77,6 +77,7 @@ def test_edits_from_a_file_are_in_the_ground_the_report_and_the_next_bake(shot):
     np.testing.assert_allclose([each.position for each in again], [step.position for step in steps], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_edits_that_are_reset_leave_the_bytes_of_a_bake_without(shot):
     folder, plain = shot
     first = stored(ground_in(folder / "plain.blend"))
@@ -91,6 +92,7 @@ def test_edits_that_are_reset_leave_the_bytes_of_a_bake_without(shot):
     assert stored(ground_in(folder / "edited.blend")) == first
 
 
+@pytest.mark.slow
 def test_edits_go_with_a_character_that_gets_another_name(shot):
     folder, plain = shot
     name = plain["steps"][2]["id"]

@@ -155,6 +155,7 @@ def test_what_was_read_at_another_time_scale_gravity_or_unit_is_not_known(scene,
     assert analysis.known(scene) is None
 
 
+@pytest.mark.slow
 def test_a_keyed_place_is_no_move(scene):
     armature = shots.walker(scene, frames=40)
     for frame, x in ((1, 0.0), (40, 0.3)):
@@ -183,6 +184,7 @@ def follow_by_constraint(field, support):
     constraint.target, constraint.use_offset = support, True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("detail", ["NEVER", "ALWAYS"])
 @pytest.mark.parametrize("stand", slow_but_one([stand_on_hidden_parent, stand_on_parent, follow_by_constraint]))
 def test_a_ground_is_known_to_have_been_moved_by_what_it_stands_on_however_it_is_hidden(scene, tmp_path, detail, stand):
@@ -332,6 +334,7 @@ def ask_for_detail(scene):
     scene.softground.detail = "ALWAYS"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "message"),
     [

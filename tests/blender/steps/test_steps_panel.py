@@ -245,6 +245,7 @@ def test_a_step_takes_the_sole_of_another_foot(baked):
     np.testing.assert_array_equal(baked_steps.of(baked.softground.ground)[2].outline(), before)
 
 
+@pytest.mark.slow
 def test_a_step_takes_the_sole_of_a_mesh(baked):
     before, shoe = stored(baked), plate(baked)
     first, two = baked_steps.of(baked.softground.ground)[1:3]
@@ -433,6 +434,7 @@ def test_a_step_that_is_none_is_named(baked):
         bpy.ops.softground.mute_step(step="Walker/foot.L@999.0")
 
 
+@pytest.mark.slow
 def test_without_a_bake_there_is_no_step_to_change(scene):
     shots.walker(scene, frames=30)
     assert not baked_steps.of(scene.softground.ground)
