@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from gallery import firs, fur, open_air
-from gallery.fox_in_powder import BODY, HAIRS, THICKNESS, coat_of, lie
+from gallery import firs, open_air
+from gallery.fox_in_powder import BODY, wear_fur
 from sample_scenes import production, stage
 from sample_scenes.four_legged import WALK, go_on_four_legs
 from sample_scenes.production import Built, Claim, Options
@@ -52,9 +52,7 @@ def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     chance = np.random.default_rng(4)
     spots = np.column_stack([-chance.uniform(18.0, 110.0, FIRS), chance.normal(0.0, 40.0, FIRS)])
     firs.add_firs(spots, chance.uniform(4.0, 12.0, FIRS), HEIGHT, firs.WINTRY, snow=0.7)
-    figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
-    coat = next(number for number, one in enumerate(figure.material_slots) if "coat" in one.material.name.lower())
-    fur.add_fur(figure, HAIRS, lie, coat_of, THICKNESS, coat)
+    wear_fur()
     scene.view_settings.exposure = 0.1
     path = folder / "fox_in_deep_snow.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)

@@ -105,13 +105,18 @@ def shoot(_built: Built, folder: Path, samples: int) -> list[Path]:
     )
     firs.add_firs(NEAR_FIRS[:, :2], NEAR_FIRS[:, 2], _height, firs.WINTRY, seed=9, snow=0.6)
     open_air.add_haze(scene.world, *AIR)
-    figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
-    coat = next(number for number, slot in enumerate(figure.material_slots) if "coat" in slot.material.name.lower())
-    fur.add_fur(figure, HAIRS, lie, coat_of, THICKNESS, coat)
+    wear_fur()
     scene.view_settings.exposure = 0.35
     path = folder / "fox_in_powder.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
+
+
+def wear_fur() -> None:
+    """Give the fox of the scene its coat."""
+    figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
+    coat = next(number for number, slot in enumerate(figure.material_slots) if "coat" in slot.material.name.lower())
+    fur.add_fur(figure, HAIRS, lie, coat_of, THICKNESS, coat)
 
 
 def lie(place: Array, normal: Array, chance: np.random.Generator) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import bpy
@@ -29,7 +29,7 @@ def cling(scene: bpy.types.Scene, character: Any) -> int:
     meshes = [obj for obj in every if not (obj.library or obj.parent_type == "BONE" or barrier_on(obj))]
     if not (meshes and soles):
         raise InputError(f"'{armature.name}' deforms no mesh that stands on its bones.")
-    clinging.cling(scene, armature, soles, meshes, _steps(scene, character))
+    clinging.cling(scene, armature, soles, meshes, _steps(scene, armature, soles))
     return len(meshes)
 
 
@@ -39,23 +39,24 @@ def follow(name: str) -> None:
     if scene is None or not any(map(clinging.is_clinging, bpy.data.node_groups)):
         return
     for character in scene.softground.characters:
-        every = meshes_on(scene.objects, character.armature) if character.armature else ()
+        armature = character.armature
+        every = meshes_on(scene.objects, armature) if armature else ()
         meshes = [obj for obj in every if modifier_with(obj, clinging.is_clinging)]
         if meshes and (soles := _soles_of(character)):
-            clinging.cling(scene, character.armature, soles, meshes, _steps(scene, character))
+            clinging.cling(scene, armature, soles, meshes, _steps(scene, armature, soles))
 
 
 def _soles_of(character: Any) -> list[Any]:
     return [sole for sole in character.soles if sole.bone in character.armature.data.bones]
 
 
-def _steps(scene: bpy.types.Scene, character: Any) -> Iterator[clinging.Step]:
-    """The steps of a character on all grounds."""
-    names = [sole.name for sole in _soles_of(character)]
+def _steps(scene: bpy.types.Scene, armature: bpy.types.Object, soles: Sequence[Any]) -> Iterator[clinging.Step]:
+    """The steps of some soles of a character on all grounds."""
+    names = [sole.name for sole in soles]
     baked = (ground for ground in settings.grounds_of(scene.softground) if baked_ground.is_baked(ground))
     for record in map(baked_ground.record_of, baked):
         stretch = baked_ground.units_of(record.about["inputs"]).time_stretch
         for step in record.edited:
-            if step.character == character.armature.name and step.sole in names:
+            if step.character == armature.name and step.sole in names:
                 middle = (step.start_frame + step.end_frame) / 2 * stretch
                 yield names.index(step.sole), middle, step.max_depth_m

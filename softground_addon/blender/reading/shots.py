@@ -295,9 +295,9 @@ def sample_characters(
             armature = settings.resolve(character.armature)
             if wanted.response:
                 check_rig(scene.objects, armature, mapping, character.mass_kg)
-                found = mapping_with_legs(character)
-                legs = {joint: bone for joint, (bone, _) in found.joints.items() if joint not in mapping.joints}
-                controls = controls_of(scene.view_layers[0], armature, found)
+                with_all = mapping_with_legs(character)
+                legs = {joint: bone for joint, (bone, _) in with_all.joints.items() if joint not in mapping.joints}
+                controls = controls_of(scene.view_layers[0], armature, with_all)
                 poses = RigPoses([*(control.bone for control in controls), *legs.values()], with_skin=wanted.carves)
             extent = extent_of(scene.unit_settings.scale_length, armature)
             grown = extent / character.size_m if character.size_m else 1.0

@@ -68,8 +68,8 @@ def mapping_with_legs(character: CharacterSettings) -> RigMapping:
 
 
 def _with_parents(armature: bpy.types.Object, bone: str) -> set[str]:
-    found = armature.data.bones.get(bone)
-    return {bone, *(parent.name for parent in found.parent_recursive)} if found else {bone}
+    at_rest = armature.data.bones.get(bone)
+    return {bone, *(parent.name for parent in at_rest.parent_recursive)} if at_rest else {bone}
 
 
 def response_curves(
