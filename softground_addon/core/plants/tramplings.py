@@ -133,8 +133,8 @@ def tramplings(footprints: Iterable[Footprint]) -> Slices[Tramplings | None]:
 
 def _first_frame(steps: Sequence[Footprint]) -> float:
     """First frame of the shot, in which the steps of contacts are numbered."""
-    kept = [(step, step.pressed_by) for step in steps if step.pressed_by is not None]
-    return min((step.load_frames[0] - by.first * step.load_spacing for step, by in kept), default=-np.inf)
+    pressed = [(step, step.pressed_by) for step in steps if step.pressed_by is not None]
+    return min((step.load_frames[0] - by.first * step.load_spacing for step, by in pressed), default=-np.inf)
 
 
 def _tiled(cells: Indices) -> tuple[Indices, int, Indices, Indices]:
