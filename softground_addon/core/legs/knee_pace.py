@@ -13,7 +13,6 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..numerics.arrays import Array, Mask
 from ..numerics.banded import solve_banded
@@ -198,22 +197,26 @@ def _relieved(
     def proper(change: Array) -> list[_Equations]:
         return _small_and_smooth(change, paced, hips, bends, leg_length)
 
+    def largest_better(toward: Array, weight: float, cost: float) -> float:
+        for parts in (_PARTS[:1], _PARTS[1:]):  # those after the first, which is often taken, all at once
+            tried = change + np.multiply.outer(parts, toward)
+            is_better = _cost(violated(tried, weight) + proper(tried)) < cost
+            if is_better.any():
+                return parts[int(np.argmax(is_better))]
+        return 0.0
+
     if hips.wanted.any():
         change = change + _solution(proper(change), change)
-    if any(len(each.wanted) for each in violated(change, 1.0)):
+    if any(np.any(each.weight) for each in violated(change, 1.0)):
         for weight in weights:
             yield
             costs, asked = proper(change), violated(change, weight)
-            cost = _cost(asked + costs)
-
-            def is_better(change: Array, weight: float = weight, cost: float = cost) -> bool:
-                return _cost(violated(change, weight) + proper(change)) < cost
-
+            cost = float(_cost(asked + costs))
             toward = _solution(asked + costs, change)
-            part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+            part = largest_better(toward, weight, cost)
             if not part:
                 toward = _solution(violated(change, weight, change + toward) + costs, change)
-                part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+                part = largest_better(toward, weight, cost)
             change = change + part * toward
     feet = {side: change[:, number] for number, side in enumerate(legs, start=axes)}
     return Relief(change[:, :axes] @ hips.axes, feet)
@@ -221,39 +224,42 @@ def _relieved(
 
 @dataclass(frozen=True)
 class _Equations:
-    """Weighted linear equations of a step.
+    """Weighted linear equations of a step, or of several that are compared (...): one for each of R samples.
 
     Attributes
     ----------
-    unknowns : (T, R) int array
-        Unknowns of each equation, ascending.
-    gradient : (T, R) float array
-    wanted : (R,) float array
+    unknowns : sequence of T ints
+        Unknowns of the first equation, ascending; those of the next lie one sample later.
+    gradient : (..., T, R) float array
+    wanted : (..., R) float array
         Remaining value of each.
-    weight : (R,) float array or float
+    weight : (..., R) float array
+        0 where an equation does not count.
     """
 
-    unknowns: NDArray[np.intp]
+    unknowns: Sequence[int]
     gradient: Array
     wanted: Array
-    weight: Array | float
+    weight: Array
 
 
 def _solution(equations: Sequence[_Equations], change: Array) -> Array:
     """Least-squares step from a correction."""
     count, width = change.shape
-    apart = max(int(each.unknowns[-1, 0] - each.unknowns[0, 0]) for each in equations if each.unknowns.size)
-    band, right = np.zeros((max(apart, 1) + 1, count * width)), np.zeros((count * width, 1))
+    apart = max(each.unknowns[-1] - each.unknowns[0] for each in equations)
+    band, right = np.zeros((max(apart, 1) + 1, count * width)), np.zeros(count * width)
     for each in equations:
+        weighted, rows = each.weight * each.gradient, each.wanted.shape[-1]
         for i, column in enumerate(each.unknowns):
-            np.add.at(right[:, 0], column, each.weight * each.gradient[i] * each.wanted)
+            columns = slice(column, column + rows * width, width)
+            right[columns] += weighted[i] * each.wanted
             for j in range(i, len(each.unknowns)):
-                np.add.at(band, (each.unknowns[j] - column, column), each.weight * each.gradient[i] * each.gradient[j])
-    return solve_banded(band, right).reshape(change.shape)
+                band[each.unknowns[j] - column, columns] += weighted[i] * each.gradient[j]
+    return solve_banded(band, right[:, None]).reshape(change.shape)
 
 
-def _cost(equations: Sequence[_Equations]) -> float:
-    return float(sum(np.sum(each.weight * each.wanted**2) for each in equations))
+def _cost(equations: Sequence[_Equations]) -> Array:
+    return np.sum([np.sum(each.weight * each.wanted**2, axis=-1) for each in equations], axis=0)
 
 
 def _allowed_turn(leg: PacedLeg, pace: Array, step: float, time_scale: float) -> Array:
@@ -274,13 +280,14 @@ def _pace_and_reach(
     weight: float,
     ahead: Array | None = None,
 ) -> list[_Equations]:
-    """Constraints of a leg where its knee turns too fast or its ankle is out of reach: with a correction, or also with
-    another, `ahead`."""
-    count, width = change.shape
+    """Constraints of a leg where its knee turns too fast or its ankle is out of reach: with a correction (..., F, U),
+    or also with another, `ahead`."""
+    width = change.shape[-1]
     axis, span = _hip_to_ankle(change, number, leg, hips)
-    by_hips = (axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)) @ hips.axes.T
-    by = np.concatenate([by_hips, np.where(leg.stands, 0.0, -1.0)[:, None]], axis=1).T
-    unknowns = np.arange(count) * width + np.array([*range(len(hips.axes)), number])[:, None]
+    by_hips = (axis / np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-9)) @ hips.axes.T
+    by_foot = np.broadcast_to(np.where(leg.stands, 0.0, -1.0)[:, None], (*span.shape, 1))
+    by = np.moveaxis(np.concatenate([by_hips, by_foot], axis=-1), -1, -2)
+    unknowns = [*range(len(hips.axes)), number]
     flexion, slope = leg.source.flexion_at(span, NEARLY_STRAIGHT)
     turn = np.diff(flexion)
     limit, is_far = np.clip(turn, -pace, pace), span > leg.reach
@@ -290,59 +297,54 @@ def _pace_and_reach(
         turn_ahead = np.diff(leg.source.flexion_at(span_ahead)[0])
         limit = np.where(is_fast, limit, np.copysign(pace, turn_ahead))
         is_fast, is_far = is_fast | (np.abs(turn_ahead) > pace), is_far | (span_ahead > leg.reach)
-    fast, far = np.flatnonzero(is_fast), np.flatnonzero(is_far)
-    then = fast + 1
+    slope = slope[..., None, :]
     return [
         _Equations(
-            np.concatenate([unknowns[:, fast], unknowns[:, then]]),
-            np.concatenate([-slope[fast] * by[:, fast], slope[then] * by[:, then]]),
-            (limit - turn)[fast],
-            weight,
+            [*unknowns, *(width + unknown for unknown in unknowns)],
+            np.concatenate([-slope[..., :-1] * by[..., :-1], slope[..., 1:] * by[..., 1:]], axis=-2),
+            limit - turn,
+            weight * is_fast,
         ),
-        _Equations(
-            unknowns[:, far],
-            by[:, far] / leg_length,
-            (leg.reach[far] - span[far]) / leg_length,
-            OUT_OF_REACH * weight,
-        ),
+        _Equations(unknowns, by / leg_length, (leg.reach - span) / leg_length, OUT_OF_REACH * weight * is_far),
     ]
 
 
 def _hip_to_ankle(change: Array, number: int, leg: PacedLeg, hips: _Hips) -> tuple[Array, Array]:
-    """Vectors from the ankle to the hip (F, 3), and their lengths less the movement of the foot (F,) [m]."""
-    axis = leg.hip + change[:, : len(hips.axes)] @ hips.axes - leg.ankle
-    return axis, np.linalg.norm(axis, axis=1) - change[:, number]
+    """Vectors from the ankle to the hip (..., F, 3), and their lengths less the movement of the foot (..., F) [m]."""
+    axis = leg.hip + change[..., : len(hips.axes)] @ hips.axes - leg.ankle
+    return axis, np.linalg.norm(axis, axis=-1) - change[..., number]
 
 
 def _small_and_smooth(
     change: Array, legs: Sequence[PacedLeg], hips: _Hips, bends: float, leg_length: float
 ) -> list[_Equations]:
-    """Equations that keep corrections small and smooth, and zero for feet that stand or would be underground."""
-    count, width = change.shape
+    """Equations that keep corrections (..., F, U) small and smooth, and zero for feet that stand or would be
+    underground."""
+    count, width = change.shape[-2:]
     axes, terms = len(hips.axes), []
     for number in range(width):
-        at = np.arange(count) * width + number
+        moved = change[..., number] / leg_length
         if number < axes:
-            size, cost = (change[:, number] - hips.wanted[:, number]) / leg_length, 1.0
+            size, cost = moved - hips.wanted[:, number] / leg_length, 1.0
             order, smoothing, magnitude = hips.order, hips.smoothing, hips.magnitude
         else:
-            size, cost = change[:, number] / leg_length, FOOT_FREEDOM
+            size, cost = moved, FOOT_FREEDOM
             order, smoothing, magnitude = 2, bends, MAGNITUDE
         stencil = smoothing * np.diff(np.eye(order + 1), order, axis=0).T * np.ones(max(count - order, 0))
-        rough = smoothing * np.diff(change[:, number] / leg_length, order)
-        samples = np.stack([at[i : max(count - order, 0) + i] for i in range(order + 1)])
-        terms.append(_Equations(samples, stencil / leg_length, -rough, cost))
-        terms.append(_pulled(at, -size, magnitude * cost, leg_length))
-        beyond = np.abs(size) > LARGEST
-        terms.append(_pulled(at[beyond], np.sign(size[beyond]) * LARGEST - size[beyond], _TOO_LARGE, leg_length))
+        samples = [number + width * i for i in range(order + 1)]
+        rough = smoothing * np.diff(moved, order)
+        terms.append(_Equations(samples, stencil / leg_length, -rough, np.full(rough.shape[-1], cost)))
+        terms.append(_pulled(number, -size, np.full(count, magnitude * cost), leg_length))
+        beyond = np.clip(size, -LARGEST, LARGEST) - size
+        terms.append(_pulled(number, beyond, _TOO_LARGE * (beyond != 0.0), leg_length))
         if number >= axes:
             leg = legs[number - axes]
-            terms.append(_pulled(at[leg.stands], -size[leg.stands], _HELD, leg_length))
-            low = ~leg.stands & (change[:, number] < -leg.room)
-            terms.append(_pulled(at[low], -leg.room[low] / leg_length - size[low], _UNDERGROUND, leg_length))
+            room = leg.room / leg_length
+            terms.append(_pulled(number, -size, _HELD * leg.stands, leg_length))
+            terms.append(_pulled(number, -room - size, _UNDERGROUND * (~leg.stands & (size < -room)), leg_length))
     return terms
 
 
-def _pulled(unknowns: NDArray[np.intp], wanted: Array, weight: float, leg_length: float) -> _Equations:
+def _pulled(unknown: int, wanted: Array, weight: Array, leg_length: float) -> _Equations:
     """Single corrections that should change by so many leg lengths."""
-    return _Equations(unknowns[None], np.full((1, len(unknowns)), 1.0 / leg_length), wanted, weight)
+    return _Equations([unknown], np.full((1, wanted.shape[-1]), 1.0 / leg_length), wanted, weight)

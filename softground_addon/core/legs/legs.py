@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -35,12 +36,12 @@ class Leg:
     ankle: Array
     toward_toes: Array
 
-    @property
+    @cached_property
     def thigh(self) -> Array:
         """Length of the thigh, (F,) [m]."""
         return _distance(self.hip, self.knee)
 
-    @property
+    @cached_property
     def shank(self) -> Array:
         """Length of the shank, (F,) [m]."""
         return _distance(self.knee, self.ankle)
