@@ -38,6 +38,19 @@ def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     return cast("bpy.types.Scene", context.scene)
 
 
+def scene_with(uid: int) -> bpy.types.Scene | None:
+    """The scene of a session uid, also after an undo; None if it was deleted."""
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
+def scene_named(name: ObjectName) -> bpy.types.Scene:
+    """The scene of a name, whatever it is called by now; InputError if it was deleted."""
+    scene = scene_with(name.uid)
+    if scene is None:
+        raise InputError(f"Scene '{name.name}' was deleted: start again in another one.")
+    return scene
+
+
 def options_of(context: bpy.types.Context) -> Any:
     """The settings of the context's scene."""
     return cast("Any", context.scene).softground
@@ -321,8 +334,8 @@ def sinks_feet(options: Any) -> bool:
     return sinks and any(character.armature for character in options.characters)
 
 
-def name_of(obj: bpy.types.Object) -> ObjectName:
-    """An object by its name, to be found again."""
+def name_of(obj: bpy.types.Object | bpy.types.Scene) -> ObjectName:
+    """An object or a scene by its name, to be found again."""
     return ObjectName(obj.name, obj.session_uid)
 
 

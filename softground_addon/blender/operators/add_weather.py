@@ -30,15 +30,15 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
 
     preset: EnumProperty(name="Preset", description="Weather to start with", items=_CHOICES, default=NONE)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    def _job_of(self) -> jobs.Job[Reports]:
         if session.current().is_live:
             raise InputError("Live mode is on, and weather acts on prints that stay: press Keep, then add weather.")
-        ground = scene.softground.ground
+        ground = self.scene.softground.ground
         ground_checks.check_playable(baked_ground.display_mesh_of(ground))
         is_new, preset = weather_result.modifier_of(ground) is None, "" if self.preset == NONE else self.preset
         yield from weather.adding(ground, preset=preset)
         if is_new and not preset:
-            weather_result.set_hours(scene, weather_result.NIGHT)
+            weather_result.set_hours(self.scene, weather_result.NIGHT)
         return []
 
 

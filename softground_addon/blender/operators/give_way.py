@@ -44,8 +44,8 @@ class SOFTGROUND_OT_give_way(Reading):
             return "Choose a ground, and select plants or litter on it"
         return super().missing(context)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        ground = scene.softground.ground
+    def _job_of(self) -> jobs.Job[Reports]:
+        ground = self.scene.softground.ground
         chosen = [obj for obj in bpy.context.selected_objects if _may_give_way(obj, ground)]
         linked = next((obj for obj in chosen if obj.library), None)
         if linked is not None:
@@ -113,10 +113,10 @@ class SOFTGROUND_OT_add_sample_meadow(Reading):
             return "Choose or create a ground first"
         return super().missing(context)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        name = settings.name_of(scene.softground.ground)
+    def _job_of(self) -> jobs.Job[Reports]:
+        name = settings.name_of(self.scene.softground.ground)
         ground = settings.resolve(name)
-        unit_scale = settings.units_of(scene).unit_scale_m
+        unit_scale = settings.units_of(self.scene).unit_scale_m
         shown = baked_ground.display_mesh_of(ground)
         steps, about = baked_ground.load(ground) if baked_ground.is_baked(ground) else ([], {"inputs": {}})
         frame = baked_ground.frame_in(about["inputs"])

@@ -48,9 +48,9 @@ class SOFTGROUND_OT_live(ModalJob):
             )
         return translated("End live mode and leave the ground as it was before")
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[live_mode.LiveMode | None]:
+    def _job_of(self) -> jobs.Job[live_mode.LiveMode | None]:
         if state.live is None:
-            return (yield from live_start.starting(scene))
+            return (yield from live_start.starting(self.scene))
         if self.keep:
             yield from state.live.keeping()
             live.forget()
@@ -58,8 +58,8 @@ class SOFTGROUND_OT_live(ModalJob):
             live.discard()
         return None
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
-        return nullcontext() if state.live is None else analysis.own_changes(state.live.current_scene() or scene)
+    def _changing(self) -> AbstractContextManager[None]:
+        return nullcontext() if state.live is None else analysis.own_changes(state.live.current_scene() or self.scene)
 
     def _show(self, result: live_mode.LiveMode | None) -> None:
         if result is not None:

@@ -25,11 +25,11 @@ class _Bake(ModalJob):
 class _Pressing(_Bake):
     """Base of operators that press the ground."""
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
-        yield from prediction.settling(scene)
-        return (yield from self._pressed(scene))
+    def _job_of(self) -> jobs.Job[bake_job.BakeResult]:
+        yield from prediction.settling(self.scene)
+        return (yield from self._pressed())
 
-    def _pressed(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+    def _pressed(self) -> jobs.Job[bake_job.BakeResult]:
         raise NotImplementedError
 
 
@@ -38,9 +38,9 @@ class _BakeFootprints(_Pressing):
 
     cancelled = "Bake cancelled: nothing was changed"
 
-    def _pressed(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
-        self._is_first = show_prints.is_first_bake(scene)
-        return bake_job.bake(scene)
+    def _pressed(self) -> jobs.Job[bake_job.BakeResult]:
+        self._is_first = show_prints.is_first_bake(self.scene)
+        return bake_job.bake(self.scene)
 
     def _show(self, result: bake_job.BakeResult) -> None:
         totals: Any = result.report["totals"]
@@ -91,8 +91,8 @@ class SOFTGROUND_OT_sink_feet(_Pressing):
     bl_idname = "softground.sink_feet"
     bl_label = "Sink Feet"
 
-    def _pressed(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
-        return sink_feet.sink_feet(scene)
+    def _pressed(self) -> jobs.Job[bake_job.BakeResult]:
+        return sink_feet.sink_feet(self.scene)
 
     def _show(self, result: bake_job.BakeResult) -> None:
         gaps: Any = result.report["gaps_mm"]
@@ -118,8 +118,8 @@ class SOFTGROUND_OT_clean_feet(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[clean_feet.CleanFeet]:
-        return clean_feet.clean_feet(scene)
+    def _job_of(self) -> jobs.Job[clean_feet.CleanFeet]:
+        return clean_feet.clean_feet(self.scene)
 
     def _show(self, result: clean_feet.CleanFeet) -> None:
         self.report({"INFO"}, result.summary)
@@ -134,8 +134,8 @@ class SOFTGROUND_OT_make_keys(_ChangingTheMotion):
     bl_idname = "softground.make_keys"
     bl_label = "Make Keys"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[make_keys.MadeKeys, ...]]:
-        return make_keys.make_keys(scene)
+    def _job_of(self) -> jobs.Job[tuple[make_keys.MadeKeys, ...]]:
+        return make_keys.make_keys(self.scene)
 
     def _show(self, result: tuple[make_keys.MadeKeys, ...]) -> None:
         for made in result:
@@ -155,8 +155,8 @@ class SOFTGROUND_OT_root_motion(_ChangingTheMotion):
         "write": "Writing the layer",
     }
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[root_motion.Travel, ...]]:
-        return root_motion.root_motion(scene)
+    def _job_of(self) -> jobs.Job[tuple[root_motion.Travel, ...]]:
+        return root_motion.root_motion(self.scene)
 
     def _show(self, result: tuple[root_motion.Travel, ...]) -> None:
         for travel in result:

@@ -75,21 +75,26 @@ class ModalJob(Act):
         return BUSY if session.current().is_baking else super().missing(context)
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
-        with self._changing(scene):
-            result = jobs.run(self._job_of(scene))
+        self._scene = settings.name_of(settings.scene_of(context))
+        with self._changing():
+            result = jobs.run(self._job_of())
         self._show(result)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
         return run(context)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Any]:
+    @property
+    def scene(self) -> bpy.types.Scene:
+        """The scene that the job began in, found anew each time: another window may show another one meanwhile."""
+        return settings.scene_named(self._scene)
+
+    def _job_of(self) -> jobs.Job[Any]:
         raise NotImplementedError
 
-    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+    def _changing(self) -> AbstractContextManager[None]:
         """What the scene's analysis makes of what the job changes."""
-        return analysis.own_changes(scene) if self.keeps_shot else nullcontext()
+        return analysis.own_changes(self.scene) if self.keeps_shot else nullcontext()
 
     def _done(self, progress: jobs.Progress) -> float:
         """The finished part of the job."""
@@ -97,18 +102,18 @@ class ModalJob(Act):
 
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        self._job, self._scene = self._job_of(scene), scene.session_uid
+        self._scene = settings.name_of(settings.scene_of(context))
+        self._job = self._job_of()
         self._started = self._ticked = self._show_at = time.perf_counter()
         self._gave_way = False
         self._progress: jobs.Progress | None = None
         try:
-            with self._changing(scene):
+            with self._changing():
                 next(self._job)  # what cannot be baked is refused before anything moves
         except StopIteration as finished:  # done at once, as with a shot that is known
             self._show(finished.value)
             return {"FINISHED"}
-        self._needed = _needed_by_job(scene) | _named(_parts_of_bodies(scene.softground))
+        self._needed = _needed_by_job(self.scene) | _named(_parts_of_bodies(self.scene.softground))
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
@@ -176,8 +181,7 @@ class ModalJob(Act):
 
     def _work(self, until: float) -> bool:
         """Go on with the job until a time; True if it is done by then, with its result, which may be None."""
-        scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
-        self._needed |= _needed_by_job(scene)
+        self._needed |= _needed_by_job(self.scene)
         blocks = _count_of_blocks()
 
         def goes_on() -> bool:
@@ -186,7 +190,7 @@ class ModalJob(Act):
             drawn_anew = _count_of_blocks() != blocks  # the whole window, as soon as the tick ends
             return time.perf_counter() < until and not drawn_anew
 
-        with self._changing(scene):
+        with self._changing():
             try:
                 self._progress = next(self._job)
                 while goes_on():

@@ -239,10 +239,10 @@ class SOFTGROUND_OT_predict_depth(ReadingShot):
     bl_label = "Predict Depth"
     cancelled = "Predict Depth cancelled"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    def _job_of(self) -> jobs.Job[Reports]:
         analysis.forget()
-        known = yield from analysis.reading(scene)
-        depth = yield from analysis.working_out_depth(scene)
+        known = yield from analysis.reading(self.scene)
+        depth = yield from analysis.working_out_depth(self.scene)
         deepest = known.contacts.depths.max(initial=0.0)
         text = translated(
             "Typical step: {typical} cm deep; the deepest: {deepest} cm",

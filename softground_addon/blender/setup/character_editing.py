@@ -103,15 +103,15 @@ class SOFTGROUND_OT_walk_ahead(_OnCharacter, Reading):
     bl_idname = "softground.walk_ahead"
     bl_label = "Walk Ahead"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        character = self.chosen(scene.softground)
+    def _job_of(self) -> jobs.Job[Reports]:
+        character = self.chosen(self.scene.softground)
         name, mover = character_setup.title_of(character), character.armature or character.body
         rig = mover and settings.name_of(mover)
-        known = yield from analysis.reading(scene)
+        known = yield from analysis.reading(self.scene)
         belt = known.belts.get(name)
         if belt is None or rig is None:
             raise InputError(f"'{name}' does not walk on the spot: its feet rest, or no speed lets all of them rest.")
-        import_fixes.walk_ahead(scene, settings.resolve(rig), -belt)
+        import_fixes.walk_ahead(self.scene, settings.resolve(rig), -belt)
         return [("INFO", translated("'{name}' travels at {speed} m/s", name=name, speed=f"{np.linalg.norm(belt):.1f}"))]
 
 
@@ -121,8 +121,8 @@ class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
     bl_idname = "softground.detect_bones"
     bl_label = "Detect Bones"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
-        return character_setup.detecting_bones(scene, scene.softground.active_character)
+    def _job_of(self) -> jobs.Job[list[str]]:
+        return character_setup.detecting_bones(self.scene, self.scene.softground.active_character)
 
     def _show(self, result: list[str]) -> None:
         self.say("Found {parts}", parts=", ".join(result))

@@ -39,8 +39,8 @@ class SOFTGROUND_OT_add_character(Reading):
     bl_idname = "softground.add_character"
     bl_label = "Add Character"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
-        return _added(scene, bpy.context.active_object, list(bpy.context.selected_objects))
+    def _job_of(self) -> jobs.Job[Reports]:
+        return _added(self.scene, bpy.context.active_object, list(bpy.context.selected_objects))
 
 
 def _added(
@@ -130,11 +130,11 @@ class SOFTGROUND_OT_use_as_ground(Reading):
             return "Select the mesh to walk on, not a character"
         return super().missing(context)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    def _job_of(self) -> jobs.Job[Reports]:
         _check_no_instance(bpy.context)
         chosen = selected_ground(bpy.context)
         assert chosen is not None
-        return _taken_as_ground(scene, chosen)
+        return _taken_as_ground(self.scene, chosen)
 
 
 def _taken_as_ground(scene: bpy.types.Scene, chosen: bpy.types.Object) -> jobs.Job[Reports]:
@@ -171,29 +171,29 @@ class SOFTGROUND_OT_create_ground(Reading):
         name="Use Selected", description="Use the selected mesh as it is, if one is selected", default=True
     )
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
+    def _job_of(self) -> jobs.Job[Reports]:
         if self.use_selected:
             _check_no_instance(bpy.context)
             if chosen := selected_ground(bpy.context):
-                return (yield from _taken_as_ground(scene, chosen))
-        options, has_first = scene.softground, settings.exists(scene.softground.ground)
-        wanted = shots.settings_of(scene)
-        plan = yield from _planned(scene, wanted)
+                return (yield from _taken_as_ground(self.scene, chosen))
+        has_first = settings.exists(self.scene.softground.ground)
+        wanted = shots.settings_of(self.scene)
+        plan = yield from _planned(self.scene, wanted)
         with ExitStack() as drafts:
             now = jobs.Progress("sample", 1.0)
             layout = yield from jobs.meanwhile(now, created_ground.laid_out.slices(wanted, plan))
             name = yield from jobs.meanwhile(now, created_ground.created(drafts, wanted, layout))
-            ground = settings.resolve(name)
-            with analysis.own_changes(scene):
+            ground, options = settings.resolve(name), self.scene.softground
+            with analysis.own_changes(self.scene):
                 before = options.ground
-                former = before if has_first and _is_as_made(before, scene) else None
-                created_ground.publish(scene, ground, wanted.surface)
+                former = before if has_first and _is_as_made(before, self.scene) else None
+                created_ground.publish(self.scene, ground, wanted.surface)
                 if former:
                     _take_place(ground, former)
                 elif before and not has_first:  # it was the next in the list
                     options.ground = before
                     further_grounds.choose(options, further_grounds.add(options, ground))
-        created_ground.select(scene, ground)
+        created_ground.select(self.scene, ground)
         count = f"{len(ground_mesh.mesh_of(ground).vertices):,}"
         text = translated("Created '{name}' with {count} vertices", name=ground.name, count=count)
         return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]

@@ -231,10 +231,10 @@ class SOFTGROUND_OT_overlay(ReadingShot):
     bl_label = "Footfall Overlay"
     cancelled = "The overlay stays hidden"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
+    def _job_of(self) -> jobs.Job[bool]:
         shown = session.current().show_overlay
         if not shown:
-            yield from analysis.reading(scene)
+            yield from analysis.reading(self.scene)
         return not shown
 
     def _show(self, result: bool) -> None:
@@ -251,10 +251,10 @@ class SOFTGROUND_OT_read_again(Reading):
     bl_options = {"INTERNAL"}
     cancelled = "The overlay shows nothing until the next edit"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
+    def _job_of(self) -> jobs.Job[bool]:
         with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-            yield from analysis.reading(scene)
-        return analysis.known(scene) is not None
+            yield from analysis.reading(self.scene)
+        return analysis.known(self.scene) is not None
 
     def _show(self, _result: bool) -> None:
         session.redraw(region_type="WINDOW")

@@ -205,9 +205,9 @@ class SOFTGROUND_OT_drop_steps(OnSteps, EditJob):
         edits = state.edits
         return changed(ground, [(step, edits[step.name]) for step in baked_steps.of(ground) if step.name in edits]), []
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
+    def _job_of(self) -> jobs.Job[list[str]]:
         try:
-            return (yield from super()._job_of(scene))
+            return (yield from super()._job_of())
         finally:
             state.edits = {}  # until now their outlines are where they were dropped
 

@@ -80,12 +80,12 @@ class EditJob(ModalJob):
 
     stage_names: ClassVar[dict[str, str]] = STAGE_NAMES | {"sample": "Reading the bake"}
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
-        ground = scene.softground.ground
+    def _job_of(self) -> jobs.Job[list[str]]:
+        ground = self.scene.softground.ground
         edits, chosen = self.wanted(ground)
         if edits != baked_ground.record_of(ground).edits:
-            bake = yield from step_edits.reading(scene)
-            yield from step_edits.editing(scene, bake, edits)
+            bake = yield from step_edits.reading(self.scene)
+            yield from step_edits.editing(self.scene, bake, edits)
         return chosen
 
     def wanted(self, ground: bpy.types.Object) -> Wanted:

@@ -272,7 +272,7 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
         return "written"
 
     bake = SimpleNamespace(
-        _scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes, _needed={}
+        scene=scene, _job=job(), _progress=None, _changing=partial(analysis.own_changes, scene), _needed={}
     )
     forever = time.perf_counter() + 1e6
     assert modal_job.ModalJob._work(bake, forever) is False
