@@ -93,8 +93,8 @@ class Pressing:
 
     Attributes
     ----------
-    scene : str
-        Name of the scene that is baked: windows may show others.
+    of : int
+        Session uid of the scene that is baked: windows may show others.
     terrain : Terrain
         The undisturbed ground.
     frame : GroundFrame or None
@@ -106,7 +106,7 @@ class Pressing:
         Triangles of the first of them, as the viewport has drawn them.
     """
 
-    scene: str
+    of: int
     terrain: Terrain
     frame: GroundFrame | None
     footprints: list[Footprint] = field(default_factory=list)
@@ -114,9 +114,9 @@ class Pressing:
     shapes: list[Any] = field(default_factory=list)
 
 
-def show_pressing(scene: str, terrain: Terrain, frame: GroundFrame | None) -> list[Footprint] | None:
+def show_pressing(of: int, terrain: Terrain, frame: GroundFrame | None) -> list[Footprint] | None:
     """The list whose prints the viewport shows until the bake ends; None where no window shows the bake."""
-    state.pressing = Pressing(scene, terrain, frame) if state.is_baking else None
+    state.pressing = Pressing(of, terrain, frame) if state.is_baking else None
     return state.pressing and state.pressing.footprints
 
 

@@ -209,7 +209,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     units = units_of(scene)
     return BakeSettings(
         file=bpy.data.filepath,
-        scene=scene.name,
+        scene=name_of(scene),
         ground=name_of(options.ground) if has_ground else None,
         characters=tuple(character_of(entry) for entry in options.characters if is_set_up(entry)),
         pressure=options.pressure,

@@ -50,7 +50,7 @@ def _on(acts: Acts) -> Mapping[str, Acts]:
 
 @dataclass(frozen=True)
 class ObjectName:
-    """An object of the scene: its name, and its number in this session, by which it is found whatever its name is."""
+    """An object, or a scene: its name, and its number in this session, by which it is found whatever its name is."""
 
     name: str
     uid: int
@@ -165,7 +165,7 @@ class BakeSettings(SceneUnits):
 
     Attributes
     ----------
-    file, scene : str
+    file, scene : str, ObjectName
         Where the shot is.
     ground : ObjectName or None
         None where one is to be made.
@@ -226,7 +226,7 @@ class BakeSettings(SceneUnits):
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
-    scene: str = field(metadata=_on(Acts.OUTPUT))
+    scene: ObjectName = field(metadata=_on(Acts.OUTPUT))
     ground: ObjectName | None
     characters: tuple[CharacterSettings, ...]
     preset: str = field(metadata=_on(Acts.PRESSING))

@@ -86,7 +86,7 @@ def _editable(blend: str) -> Iterator[Any]:
         bpy.ops.wm.open_mainfile(filepath=blend)
         scene = bpy.context.scene
         bake = jobs.run(step_edits.reading(scene))
-        yield scene, bake, lambda edits: jobs.run(step_edits.editing(scene, bake, edits))
+        yield scene, bake, lambda edits: jobs.run(step_edits.editing(bake, edits))
     finally:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         softground_addon.unregister()

@@ -72,7 +72,7 @@ def read_clip(scene: bpy.types.Scene) -> tuple[CharacterLoads, Terrain]:
     """The loads of a scene's character as they are found by default, and the ground that fits it."""
     set_up_automatically(scene)
     wanted = settings_of(scene)
-    shot = jobs.run(read_shot(scene, wanted))
+    shot = jobs.run(read_shot(wanted))
     return jobs.run(estimate_shot(wanted, shot))[0], shot.terrain
 
 

@@ -98,7 +98,7 @@ def bake(
     asked = wanted or settings_of(scene)
     wanted, refused = response_job.without_sinking(scene.view_layers[0], asked)
     started = time.perf_counter()
-    shot, said = yield from _read(scene, wanted, write=write)
+    shot, said = yield from _read(wanted, write=write)
     surfaces = [part.surface for part in shot.of_each_ground if part.surface]
     edits = step_soles.edits_with_soles(scene.objects, wanted, edits)
     soles = staleness.of_soles(scene.objects, mesh_soles(edits))
@@ -150,7 +150,7 @@ def bake(
             for each, inputs in zip(prints.grounds, of_grounds, strict=True)
         ]
         del prints
-        published, of_writing = yield from _write_all(scene, shot, to_write, sole_length)
+        published, of_writing = yield from _write_all(shot, to_write, sole_length)
         findings += of_writing
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene.softground, wanted, layers)
@@ -189,7 +189,7 @@ def _inputs(made_with: BakeSettings, shot: Shot) -> dict[str, Any]:
 
 
 def _write_all(
-    scene: bpy.types.Scene, shot: Shot, prints: list[GroundPrints], sole_length: float
+    shot: Shot, prints: list[GroundPrints], sole_length: float
 ) -> Job[tuple[list[Published | None], list[Finding]]]:
     """Put the prints on their grounds; what the scene shows is changed of all of them at once, in the last step.
 
@@ -198,7 +198,7 @@ def _write_all(
     published: list[Published | None] = []
     findings: list[Finding] = []
     writing = [
-        write_prints(scene, each.made_with, part, each.record, each.debris, sole_length)
+        write_prints(each.made_with, part, each.record, each.debris, sole_length)
         if each.record.footprints or len(prints) == 1 or _has_weather(each.made_with)
         else None
         for each, part in zip(prints, shot.of_each_ground, strict=True)
@@ -231,10 +231,11 @@ def _has_weather(made_with: BakeSettings) -> bool:
     return ground is not None and bool(weather.values_of(ground))
 
 
-def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
+def _read(wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]]]:
     """A shot, and what the user should know of what it was read from; InputError if nobody moves in what is written."""
+    scene = settings.scene_named(wanted.scene)
     moving = bake_report.ground_findings(settings.resolve(wanted.ground) if wanted.ground else None, wanted.frames[0])
-    shot = yield from read_shot(scene, wanted)
+    shot = yield from read_shot(wanted)
     if write:
         check_motion(wanted, shot.motions)
     skins = [
@@ -242,11 +243,10 @@ def _read(scene: bpy.types.Scene, wanted: BakeSettings, *, write: bool) -> Job[t
         *bake_report.shapes_left_out(scene.objects, wanted),
     ]
     moving += bake_report.unlisted_findings(scene.softground, wanted)
-    return shot, [*moving, *scene_findings(scene, wanted, shot), *skins]
+    return shot, [*moving, *scene_findings(wanted, shot), *skins]
 
 
 def write_prints(
-    scene: bpy.types.Scene,
     wanted: BakeSettings,
     shot: Shot,
     record: BakeRecord,
@@ -279,7 +279,7 @@ def write_prints(
         _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
         findings: list[Finding] = []
         if shot.surface is None:
-            place = yield from _created(drafts, scene, wanted, shot, trail)
+            place = yield from _created(drafts, wanted, shot, trail)
             record.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, footprints, trail, sole_length)
@@ -291,9 +291,7 @@ def write_prints(
     return published, findings
 
 
-def _created(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, trail: Trail
-) -> Job[baked_ground.Place]:
+def _created(drafts: ExitStack, wanted: BakeSettings, shot: Shot, trail: Trail) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake; fine as well where legs ploughed."""
     now, cell_size, layout, plan = Progress("write", 0.1), wanted.cell_size_m, shot.layout, shot.plan
     assert layout is not None
@@ -305,7 +303,7 @@ def _created(
     name = yield from meanwhile(now, created_ground.created(drafts, wanted, layout))
     yield now
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
-    return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
+    return baked_ground.on_created(wanted, name, index, layout.vertices)
 
 
 CLOSE_UP_FROM = 1.5

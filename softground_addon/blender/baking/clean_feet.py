@@ -83,7 +83,7 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     assert wanted.response is not None
     wanted = replace(wanted, response=replace(wanted.response, tilt=None))
     response_job.check_characters(wanted.characters)
-    shot = yield from read_shot(scene, wanted, LayerKind.CLEAN_FEET)
+    shot = yield from read_shot(wanted, LayerKind.CLEAN_FEET)
     shot = replace(shot, motions=shot.responding)
     stood = standing_on.slices(shot.motions, shot.terrain, wanted.response)
     standing = yield from meanwhile(Progress("sample", 1.0), stood)

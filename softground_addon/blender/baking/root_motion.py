@@ -76,7 +76,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     for moving in wanted.characters:
         if moving.armature:
             check_layerable(settings.resolve(moving.armature))
-    shot = yield from read_shot(scene, wanted, LayerKind.ROOT_MOTION)
+    shot = yield from read_shot(wanted, LayerKind.ROOT_MOTION)
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
     caveat = ""

@@ -38,8 +38,9 @@ _NO_MOTION = ("hide", "show_", "color", "display", "layers", "is_visible")
 """Words in the paths of drivers that move nothing."""
 
 
-def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> list[Finding]:
+def scene_findings(wanted: BakeSettings, shot: Shot) -> list[Finding]:
     """Findings about a scene whose shot was just read."""
+    scene = settings.scene_named(wanted.scene)
     movers = [mover for character in wanted.characters for mover in staleness.movers_of(character)]
     followed = list(dict.fromkeys(node for mover in movers for node in (mover, *all_leaders(mover))))
     first, last = (frame * wanted.time_stretch for frame in wanted.frames)
@@ -52,9 +53,9 @@ def scene_findings(scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> 
             object_named(sole.object) for character in wanted.characters for sole in character.soles if sole.object
         ),
         *_followed_shapes(wanted),
-        *_crowds(scene, wanted),
-        *_unseen_ground(scene, wanted),
-        *_rigs_below(scene, wanted),
+        *_crowds(scene.objects, scene.view_layers[0], wanted),
+        *_unseen_ground(scene.objects, scene.view_layers[0], wanted),
+        *_rigs_below(scene.objects, wanted),
         *_edited_plants(),
         *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
     ]
@@ -82,7 +83,7 @@ def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
         yield Finding(
             "gravity_direction",
             "note",
-            f"Gravity of scene '{wanted.scene}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
+            f"Gravity of scene '{wanted.scene.name}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
             "no character stands upright in it: bodies weigh straight down in the bake, by "
             f"{wanted.gravity_m_s2:.2f} m/s².",
             "Set Gravity in the Scene properties to point where the feet of the characters do.",
@@ -223,31 +224,33 @@ def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
     ]
 
 
-def _crowds(scene: bpy.types.Scene, wanted: BakeSettings) -> Sequence[Finding]:
+def _crowds(objects: settings.Objects, view_layer: bpy.types.ViewLayer, wanted: BakeSettings) -> Sequence[Finding]:
     """Copies of what prints that are instances."""
-    showing = instancers(scene, staleness.bodies_of(scene.objects, wanted))
+    showing = instancers(objects, view_layer, staleness.bodies_of(objects, wanted))
     return [
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())
     ]
 
 
-def _unseen_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+def _unseen_ground(
+    objects: settings.Objects, view_layer: bpy.types.ViewLayer, wanted: BakeSettings
+) -> Iterator[Finding]:
     """A ground that is in another scene, or in none, so that its prints are seen there alone."""
     ground = find(wanted.ground) if wanted.ground else None
-    if ground is not None and ground.name not in scene.objects and not instancers(scene, [ground]):
+    if ground is not None and all(obj != ground for obj in objects) and not instancers(objects, view_layer, [ground]):
         yield Finding(
             "unseen_ground",
             "warning",
-            f"Ground '{ground.name}' is not in scene '{scene.name}', where its prints are not seen",
+            f"Ground '{ground.name}' is not in scene '{wanted.scene.name}', where its prints are not seen",
             "link it there (Object > Link/Transfer Data > Link Objects to Scene), or choose another one.",
         )
 
 
-def _rigs_below(scene: bpy.types.Scene, wanted: BakeSettings) -> Iterator[Finding]:
+def _rigs_below(objects: settings.Objects, wanted: BakeSettings) -> Iterator[Finding]:
     """Rigs that nobody added under a character that was."""
     bodies = [settings.resolve(character.armature) for character in wanted.characters if character.armature]
     for body in bodies:
-        if names := [rig.name for rig in rigs_below(scene.objects, body) if rig not in bodies]:
+        if names := [rig.name for rig in rigs_below(objects, body) if rig not in bodies]:
             said = f"{listed(names)} stands under '{body.name}' and is no character: its feet do not print"
             yield Finding("rig_below", "warning", said, "add it, or join the two rigs of one body (Ctrl J).")

@@ -145,7 +145,7 @@ def _stood(wanted: BakeSettings, shot: Shot) -> Job[_Stood]:
 def _pressed(wanted: BakeSettings, shot: Shot, stood: _Stood, edits: Mapping[str, StepEdit]) -> Job[ShotPrints]:
     at_end = Progress("simulate", 1.0)
     grounds = list(map(ground_of, wanted.of_each_ground, shot.of_each_ground))
-    seen = session.show_pressing(wanted.scene, shot.terrain, shot.frame)
+    seen = session.show_pressing(wanted.scene.uid, shot.terrain, shot.frame)
     pressing = press_shot(wanted, shot.responding, *stood, shot.terrain, grounds, edits, seen)
     pressed = yield from counted(pressing, "simulate", wanted.frames[1] - wanted.frames[0] + 1)
     prints: list[GroundPrints] = []

@@ -84,15 +84,16 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[EditableBake]:
     )
 
 
-def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> jobs.Job[None]:
-    """Show the bake on the scene's ground with other edits, in steps; those that change nothing of a step are dropped.
+def editing(bake: EditableBake, edits: Mapping[str, StepEdit]) -> jobs.Job[None]:
+    """Show the bake on its ground with other edits, in steps; those that change nothing of a step are dropped.
 
     Raises
     ------
     InputError
         If a step is to be moved of which the record keeps too little, or the ground cannot be written.
     """
-    ground = scene.softground.ground
+    assert bake.made_with.ground
+    ground = settings.resolve(bake.made_with.ground)
     ground_checks.check_writable(ground)
     edits = {name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)}
     pressing = EditedSteps.record_with.slices(bake.steps, bake.record, edits)
@@ -106,12 +107,12 @@ def editing(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, Step
     record, debris = yield from jobs.meanwhile(jobs.Progress("simulate", 1.0), throwing)
     shed = shed_volumes(debris) if debris is not None else {}
     debris = None if is_deleted else debris
-    published, _ = yield from bake_job.write_prints(scene, bake.made_with, bake.shot, record, debris, sole_length)
+    published, _ = yield from bake_job.write_prints(bake.made_with, bake.shot, record, debris, sole_length)
     marks_object.follow(published.ground, record.steps, shed)
     sign(
         published,
         bake.made_with,
-        _sole_hashes(scene.objects, stamp, bake, edits),
+        _sole_hashes(settings.scene_named(bake.made_with.scene).objects, stamp, bake, edits),
         summary=summary | bake_report.summary_of_prints(record.edited),
         warnings=warnings,
         stamp=stamp,

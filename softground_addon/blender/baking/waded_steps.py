@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
+from ...core.settings import ObjectName
 from .. import settings
 from ..carried import clinging
 from ..ground import baked_ground
@@ -33,9 +34,9 @@ def cling(scene: bpy.types.Scene, character: Any) -> int:
     return len(meshes)
 
 
-def follow(name: str) -> None:
+def follow(name: ObjectName) -> None:
     """Bring what clings to the characters of a scene up to date with the bakes of all grounds."""
-    scene = bpy.data.scenes.get(name)
+    scene = settings.scene_with(name.uid)
     if scene is None or not any(map(clinging.is_clinging, bpy.data.node_groups)):
         return
     for character in scene.softground.characters:

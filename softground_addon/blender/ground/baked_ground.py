@@ -21,14 +21,14 @@ from ...core.record import record
 from ...core.record.edits import StepEdit, with_names
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample
-from ...core.settings import CharacterSettings, ObjectName, renamed
+from ...core.settings import BakeSettings, CharacterSettings, ObjectName, renamed
 from ..carried import marks_object
 from ..debris import debris_object
 from ..jobs import Job, Progress
 from ..placement import events_in_world
 from ..plants import trampling_table
 from ..playback import own_data, playback
-from ..settings import SceneUnits, exists, name_of, resolve
+from ..settings import SceneUnits, exists, name_of, resolve, scene_named
 from . import created_ground, ground_checks, ground_mesh, ground_surface, hidden_ground, trail_detail
 
 LARGEST_UNIT = 1e12
@@ -106,11 +106,11 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
-def on_created(scene: bpy.types.Scene, draft: ObjectName, index: Indices, vertices: Array, surface: str) -> Place:
+def on_created(wanted: BakeSettings, draft: ObjectName, index: Indices, vertices: Array) -> Place:
     """A ground that is not in the scene yet."""
 
     def publish() -> bpy.types.Object:
-        created_ground.publish(scene, resolve(draft), surface)
+        created_ground.publish(scene_named(wanted.scene), resolve(draft), wanted.surface)
         return resolve(draft)
 
     return Place(index, vertices[index], draft, publish)

@@ -63,15 +63,9 @@ class LiveMode:
         The grounds that soles touch, or the first.
     """
 
-    def __init__(
-        self,
-        scene: bpy.types.Scene,
-        wanted: BakeSettings,
-        known: analysis.Analysis,
-        parts: Sequence[LivePart],
-    ) -> None:
+    def __init__(self, wanted: BakeSettings, known: analysis.Analysis, parts: Sequence[LivePart]) -> None:
         assert wanted.ground is not None
-        self.scene = scene.session_uid
+        self.scene = wanted.scene.uid
         self.rendering = False
         self.answered_at = 0.0  # on the clock of `time.perf_counter`
         self._refused: tuple[BakeSettings, analysis.Analysis, str] | None = None
@@ -139,7 +133,7 @@ class LiveMode:
         scene = self._here()
         asked = settings.snapshot(scene)
         if self._can_start_over and self._is_another(asked):
-            if analysis.known(scene, asked) is None:
+            if analysis.known(asked) is None:
                 if self._asked != asked and np.isfinite(until):  # to be read as a whole, but not while it is dragged
                     self._asked = asked
                     return False
@@ -160,7 +154,7 @@ class LiveMode:
         """True if settings or animation differ from those that are being pressed, or were last."""
         if self._left_out():
             return False  # other grounds want another live mode
-        known = analysis.known(self._here(), asked)
+        known = analysis.known(asked)
         if self._refused and self._refused[0] == asked and known is self._refused[1]:
             return False
         if self._answering is None and known is not self._analysis:
@@ -182,7 +176,7 @@ class LiveMode:
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
         """Press the shot up to the frame that is shown: the newest steps onto the present ground, then all of them."""
-        known = yield from jobs.meanwhile(None, analysis.refreshing(self._here()))
+        known = yield from jobs.meanwhile(None, analysis.refreshing(asked))
         if known is None:
             raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
@@ -240,7 +234,7 @@ class LiveMode:
 
     def current_scene(self) -> bpy.types.Scene | None:
         """The scene, which may be another one after an undo."""
-        return next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
+        return settings.scene_with(self.scene)
 
     def _here(self) -> bpy.types.Scene:
         scene = self.current_scene()

@@ -66,7 +66,7 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         ready = []
         for number in numbers:
             of_ground = wanted.of_each_ground[number], shots[number], shares[number]
-            ready.append((yield from _ready(drafts, scene, *of_ground)))
+            ready.append((yield from _ready(drafts, *of_ground)))
         yield PRESSING
         with analysis.own_changes(scene):
             shown = [_put_on(*each, made_with=wanted.of_each_ground[n]) for n, each in zip(numbers, ready, strict=True)]
@@ -75,17 +75,18 @@ def starting(scene: bpy.types.Scene) -> Job[LiveMode]:
         wanted, known = replace(wanted, ground=settings.name_of(shown[0])), analysis.read(scene)
     owners = wanted.soft_grounds
     parts = [LivePart(owners[n], *each[1:]) for n, each in zip(numbers, ready, strict=True)]
-    return LiveMode(scene, wanted, known, parts)
+    return LiveMode(wanted, known, parts)
 
 
 def _ready(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
+    drafts: ExitStack, wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
 ) -> Job[tuple[baked_ground.Place, LiveGround, Playhead]]:
     """A ground, pressed up to the frame that is shown, before its scene has it."""
-    place = yield from _place(drafts, scene, wanted, shot)
+    place = yield from _place(drafts, wanted, shot)
     yield PRESSING
     ground = LiveGround(place, wanted.unit_scale_m, wanted.frame)
-    playhead, frame = Playhead(loads, ground_of(wanted, shot), wanted.cell_size_m), float(scene.frame_current)
+    playhead = Playhead(loads, ground_of(wanted, shot), wanted.cell_size_m)
+    frame = float(settings.scene_named(wanted.scene).frame_current)
     while playhead.advance(frame):
         yield PRESSING
     windows = playhead.ground.tile_windows()
@@ -102,7 +103,7 @@ def _put_on(
     return shown
 
 
-def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot) -> Job[baked_ground.Place]:
+def _place(drafts: ExitStack, wanted: BakeSettings, shot: Shot) -> Job[baked_ground.Place]:
     """The ground that takes the prints, a new one, or a copy that is fine where the characters will step.
 
     Raises
@@ -125,7 +126,7 @@ def _place(drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot
         layout = yield from placing(created_ground.laid_out.slices(wanted, shot.plan))
         name = yield from placing(created_ground.created(drafts, wanted, layout))
         index = yield from placing(pressed(layout.vertices, is_near))
-        return baked_ground.on_created(scene, name, index, layout.vertices, wanted.surface)
+        return baked_ground.on_created(wanted, name, index, layout.vertices)
 
     name, vertices = wanted.ground, shot.surface.vertices if shot.surface else None
     if vertices is None:  # it was made for the shot

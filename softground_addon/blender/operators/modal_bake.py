@@ -26,7 +26,7 @@ class _Pressing(_Bake):
     """Base of operators that press the ground."""
 
     def _job_of(self) -> jobs.Job[bake_job.BakeResult]:
-        yield from prediction.settling(self.scene)
+        yield from prediction.settling(self.scene.session_uid)
         return (yield from self._pressed())
 
     def _pressed(self) -> jobs.Job[bake_job.BakeResult]:

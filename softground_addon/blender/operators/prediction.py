@@ -72,12 +72,7 @@ class DepthPrediction:
 
 def of(scene: bpy.types.Scene) -> DepthPrediction | None:
     """The prediction for a scene whose shot is known; to be shown; an outdated one is computed again soon."""
-    return _look(scene)[1]
-
-
-def asked(scene: bpy.types.Scene) -> BakeSettings:
-    """The settings of a scene as panels and overlay are drawn."""
-    return _look(scene)[0]
+    return look(scene)[1]
 
 
 def fineness(wanted: BakeSettings, predicted: DepthPrediction) -> Fineness:
@@ -91,21 +86,22 @@ def look_anew() -> None:
     state.seen.clear()
 
 
-def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]:
-    """Look once in a turn."""
+def look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]:
+    """The settings of a scene as panels and overlay are drawn, and the prediction of `of`: looked at once in a turn."""
     if not bpy.app.timers.is_registered(look_anew):
         state.seen.clear()
         if not bpy.app.background:  # where there are no turns
             bpy.app.timers.register(look_anew, persistent=True)
     if scene.session_uid not in state.seen:
         wanted = settings.snapshot(scene)
-        state.seen[scene.session_uid] = wanted, _prediction(scene.session_uid, analysis.known(scene, wanted), wanted)
+        state.seen[scene.session_uid] = wanted, _prediction(analysis.known(wanted), wanted)
     seen: tuple[BakeSettings, DepthPrediction | None] = state.seen[scene.session_uid]
     return seen
 
 
-def _prediction(uid: int, known: analysis.Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
-    """The prediction for the scene of a session uid, by what is known of its shot."""
+def _prediction(known: analysis.Analysis | None, wanted: BakeSettings) -> DepthPrediction | None:
+    """The prediction with some settings of a scene, by what is known of its shot."""
+    uid = wanted.scene.uid
     if known is None:
         return None
     depth = analysis.known_depth(known, wanted)
@@ -131,10 +127,10 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     if not depth > 0:
         return
     try:
-        known = analysis.read(scene) if bpy.app.background else jobs.run(analysis.refreshing(scene))
+        wanted = settings.snapshot(scene)
+        known = analysis.read(scene) if bpy.app.background else jobs.run(analysis.refreshing(wanted))
         if known is None:
             return
-        wanted = settings.snapshot(scene)
         if bpy.app.background or depth / 100 > wanted.material.deepest or not state.shown_depths.get(scene.session_uid):
             modulus = prediction.matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
             scene.softground.material.youngs_modulus = modulus
@@ -161,17 +157,21 @@ def aim_at(scene: bpy.types.Scene, depth: float) -> None:
     state.aims[scene.session_uid] = _Aim(depth, material.youngs_modulus)
 
 
-def settling(scene: bpy.types.Scene) -> jobs.Job[None]:
-    """Set the stiffness for the depth that was typed last, unless it is set otherwise meanwhile."""
-    aim: _Aim | None = state.aims.pop(scene.session_uid, None)
-    known, material = analysis.known(scene), scene.softground.material
-    if aim is None or known is None or material.youngs_modulus != aim.modulus:
+def settling(uid: int) -> jobs.Job[None]:
+    """Set the stiffness of the scene of a session uid for the depth that was typed last, unless it is set otherwise
+    meanwhile."""
+    aim: _Aim | None = state.aims.pop(uid, None)
+    if aim is None or (scene := settings.scene_with(uid)) is None:
         return
     wanted = settings.snapshot(scene)
+    known = analysis.known(wanted)
+    if known is None or scene.softground.material.youngs_modulus != aim.modulus:
+        return
     search = prediction.matching_modulus.slices(known.contacts, wanted.material, aim.depth, wanted.pressure)
     with suppress(InputError):  # the stiffness that comes nearest stays
         modulus = yield from jobs.meanwhile(jobs.Progress("sample", 0.0), search)
-        if scene.softground.material.youngs_modulus == aim.modulus:
+        scene = settings.scene_with(uid)  # which an undo may have replaced
+        if scene and scene.softground.material.youngs_modulus == aim.modulus:
             scene.softground.material.youngs_modulus = modulus
 
 
@@ -180,8 +180,8 @@ def _work_out() -> float | None:
     if live.is_answering():
         return SOON
     if not state.predicting:
-        for work in (analysis.working_out_depth, settling):  # the last is done first
-            state.predicting.extend(work(scene) for scene in _shown_scenes())
+        for work in (_working_out_depth, settling):  # the last is done first
+            state.predicting.extend(work(wanted.scene.uid) for wanted in _shown())
     if not _is_done(state.predicting):
         return PAUSE
     if not state.aims and not bpy.app.timers.is_registered(_refine):
@@ -189,12 +189,18 @@ def _work_out() -> float | None:
     return PAUSE if state.aims else None
 
 
+def _working_out_depth(uid: int) -> jobs.Job[None]:
+    """Work the depth out in the scene of a session uid, with its settings as they are when it begins."""
+    if scene := settings.scene_with(uid):
+        yield from analysis.working_out_depth(settings.snapshot(scene))
+
+
 def _refine() -> float | None:
     """Press all contacts, where the depths that are shown come from a sample of them."""
     if live.is_answering():
         return AT_REST
     if not state.refining:
-        state.refining.extend(analysis.pressing_all(scene) for scene in _shown_scenes())
+        state.refining.extend(map(analysis.pressing_all, _shown()))
     return None if _is_done(state.refining) else PAUSE
 
 
@@ -205,10 +211,10 @@ def _stop_refining() -> None:
         bpy.app.timers.unregister(_refine)
 
 
-def _shown_scenes() -> list[bpy.types.Scene]:
-    """Scenes in windows whose shot is known."""
+def _shown() -> list[BakeSettings]:
+    """Settings of the scenes in windows whose shot is known."""
     scenes = {window.scene for window in bpy.context.window_manager.windows}
-    return [scene for scene in scenes if analysis.known(scene)]
+    return list(filter(analysis.known, map(settings.snapshot, scenes)))
 
 
 def _is_done(work: list[jobs.Job[None]]) -> bool:
@@ -242,7 +248,7 @@ class SOFTGROUND_OT_predict_depth(ReadingShot):
     def _job_of(self) -> jobs.Job[Reports]:
         analysis.forget()
         known = yield from analysis.reading(self.scene)
-        depth = yield from analysis.working_out_depth(self.scene)
+        depth = yield from analysis.working_out_depth(settings.snapshot(self.scene))
         deepest = known.contacts.depths.max(initial=0.0)
         text = translated(
             "Typical step: {typical} cm deep; the deepest: {deepest} cm",

@@ -27,7 +27,6 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
         options = settings.options_of(context)
         column = layout.column()
         column.prop(options, "cell_size_cm")
@@ -35,19 +34,18 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         amount = column.row()
         amount.active = options.relief != "OFF"
         amount.prop(options, "relief_strength", text="Amount", text_ctxt=CONTEXT)
-        predicted = prediction.of(scene)
+        wanted, predicted = prediction.look(settings.scene_of(context))
         if predicted:
             row = column.row()
             row.active = False
-            text = estimate(predicted.analysis.coverage, prediction.fineness(prediction.asked(scene), predicted))
+            text = estimate(predicted.analysis.coverage, prediction.fineness(wanted, predicted))
             row.label(text=text, icon="TIME", translate=False)
         if options.relief == "CLOSE_UP":
             column.prop(options, "relief_vertices")
             if predicted:
                 row = column.row()
                 row.active = False
-                fine = prediction.asked(scene).fineness
-                text = vertices(predicted.analysis.coverage.vertices(fine), options.relief_vertices)
+                text = vertices(predicted.analysis.coverage.vertices(wanted.fineness), options.relief_vertices)
                 row.label(text=text, icon="INFO", translate=False)
         column.prop(options, "tread_mm")
         column.prop(options, "tread_pattern")

@@ -17,7 +17,7 @@ WAIT = 0.3
 
 def watch(scene: bpy.types.Scene) -> None:
     """Have the bake compared soon if the settings are others now: operators that set some tell nobody."""
-    is_another = state.compared.get(scene.session_uid) != weather.felt(prediction.asked(scene))
+    is_another = state.compared.get(scene.session_uid) != weather.felt(prediction.look(scene)[0])
     if is_another and not bpy.app.timers.is_registered(compare_bake):
         bpy.app.timers.register(compare_bake, first_interval=SOON)
 

@@ -274,7 +274,7 @@ def draw_preset(layout: Any, scene: Any) -> None:
     surface = SURFACES.get(options.material.surface)  # none where what is stored is broken
     felt = surface and surface.control
     layout.prop(*((options, felt) if felt else (options.material, "stiffness_mpa")))  # nothing moves between grounds
-    predicted = prediction.of(scene)
+    wanted, predicted = prediction.look(scene)
     row = layout.row(align=True)
     if predicted is None:
         row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
@@ -283,7 +283,7 @@ def draw_preset(layout: Any, scene: Any) -> None:
     field.active = predicted.is_current
     field.prop(options, "depth_cm")
     row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
-    deepest = prediction.asked(scene).material.deepest
+    deepest = wanted.material.deepest
     if predicted.depth and predicted.depth > NEARLY_AT_BOTTOM * deepest:
         text = translated("Pressed to the bottom, {depth} cm", depth=f"{deepest * 100:.3g}")
         layout.label(text=text, icon="ERROR", translate=False)

@@ -88,7 +88,8 @@ def look_again() -> None:
     scenes = {scene.session_uid: scene for scene in bpy.data.scenes}
     for uid, analysis in list(state.analyses.items()):
         scene = scenes.get(uid)
-        if scene is None or known(scene) is None or _hash_of(scene) not in analysis.hashes:
+        wanted = settings.snapshot(scene) if scene else None
+        if wanted is None or known(wanted) is None or _hash_of(wanted) not in analysis.hashes:
             del state.analyses[uid]
 
 
@@ -97,30 +98,23 @@ def is_empty() -> bool:
     return not state.analyses
 
 
-def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysis | None:
-    """The scene's analysis if it was read and still holds, with the masses and force models that it was last asked for.
+def known(wanted: BakeSettings) -> Analysis | None:
+    """Analysis of the scene of some settings, if it was read and still holds, with the masses and force models that it
+    was last asked for.
 
     Only looks; see `refreshing`.
     """
-    analysis: Analysis | None = state.analyses.get(scene.session_uid)
-    return (
-        analysis
-        if analysis and _source(scene.softground.ground, wanted or settings.snapshot(scene)) in analysis.sources
-        else None
-    )
+    analysis: Analysis | None = state.analyses.get(wanted.scene.uid)
+    return analysis if analysis and _source(wanted) in analysis.sources else None
 
 
-def refreshing(scene: bpy.types.Scene) -> jobs.Job[Analysis | None]:
-    """The scene's analysis if it was read and still holds, with the masses and force models of the moment, in steps.
-
-    The scene is asked for nothing after the first.
-    """
-    wanted, uid = settings.snapshot(scene), scene.session_uid
-    analysis = known(scene, wanted)
+def refreshing(wanted: BakeSettings) -> jobs.Job[Analysis | None]:
+    """Analysis of the scene of some settings, if it was read and still holds, with their masses and force models."""
+    analysis, uid = known(wanted), wanted.scene.uid
     if analysis is None or analysis.terms == _terms(wanted):
         return analysis
     try:
-        return (yield from _keep(uid, wanted, analysis.shot, analysis.sources, analysis.hashes))
+        return (yield from _keep(wanted, analysis.shot, analysis.sources, analysis.hashes))
     except InputError:
         state.analyses.pop(uid, None)
         return None
@@ -139,12 +133,12 @@ def read(scene: bpy.types.Scene) -> Analysis:
 
 def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     """Job of `read`."""
-    analysis = yield from refreshing(scene)
+    analysis = yield from refreshing(settings.snapshot(scene))
     if analysis is None:
         wanted = settings_of(scene)
-        shot = replace((yield from read_shot(scene, replace(wanted, response=None))), layout=None)  # which is large
-        source, hashes = _source(scene.softground.ground, wanted), frozenset([_hash_of(scene)])
-        analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
+        shot = replace((yield from read_shot(replace(wanted, response=None))), layout=None)  # which is large
+        hashes = frozenset([_hash_of(settings.snapshot(scene))])
+        analysis = yield from _keep(wanted, shot, (_source(wanted),), hashes)
         _tell_of_changes(scene.view_layers)  # response layers were switched off and on again, which is no edit
         state.analyses[scene.session_uid] = analysis
     return analysis
@@ -153,18 +147,20 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
 @contextmanager
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     """Context of changes that leave the shot as it was read: prints, response, a ground made to fit it."""
+    analysis = None
     if scene.session_uid in state.analyses:
         _tell_of_changes(scene.view_layers)  # of what others have changed until now, while it still counts
-    analysis = known(scene)
+        analysis = known(settings.snapshot(scene))
     yield
     if analysis is None:
         return
     _tell_of_changes(scene.view_layers)
-    source = _source(scene.softground.ground, settings.snapshot(scene))
+    now = settings.snapshot(scene)
+    source = _source(now)
     if source in analysis.sources:
         state.analyses[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
-        sources, hashes = (*analysis.sources, source), analysis.hashes | {_hash_of(scene)}
+        sources, hashes = (*analysis.sources, source), analysis.hashes | {_hash_of(now)}
         state.analyses[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
@@ -176,13 +172,12 @@ def _tell_of_changes(view_layers: Iterable[bpy.types.ViewLayer]) -> None:
 
 def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> float | None:
     """Depth of the typical print to expect [m] in a material, or the scene's; None where the shot is not known."""
-    return jobs.run(working_out_depth(scene, material))
+    return jobs.run(working_out_depth(settings.snapshot(scene), material))
 
 
-def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> jobs.Job[float | None]:
-    """Job of `expected_depth`. The scene is asked for nothing after the first."""
-    wanted = settings.snapshot(scene)
-    analysis = yield from refreshing(scene)
+def working_out_depth(wanted: BakeSettings, material: GroundMaterial | None = None) -> jobs.Job[float | None]:
+    """Job of `expected_depth`, with some settings of the scene."""
+    analysis = yield from refreshing(wanted)
     if analysis is None:
         return None
     key = _key(wanted, analysis, material)
@@ -192,10 +187,9 @@ def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = 
     return state.depths[key]
 
 
-def pressing_all(scene: bpy.types.Scene) -> jobs.Job[None]:
-    """Press every contact into the scene's material, where its depth comes from a sample of them."""
-    wanted, uid = settings.snapshot(scene), scene.session_uid
-    analysis = known(scene, wanted)
+def pressing_all(wanted: BakeSettings) -> jobs.Job[None]:
+    """Press every contact into the material of some settings, where its depth comes from a sample of them."""
+    analysis, uid = known(wanted), wanted.scene.uid
     if analysis is None or analysis.terms != _terms(wanted) or analysis.contacts.is_in(*_key(wanted, analysis)[1:]):
         return
     work = pressed_again.slices(analysis.contacts, wanted.material, wanted.pressure)
@@ -237,30 +231,30 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
     return material.youngs_modulus
 
 
-def _keep(
-    uid: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
-) -> jobs.Job[Analysis]:
-    """Work the loads of a shot out and know it from now on, by the session uid of its scene."""
+def _keep(wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]) -> jobs.Job[Analysis]:
+    """Work the loads of a shot out and know it from now on."""
     loads = yield from estimate_shot(wanted, shot)
     pressing = pressed_contacts.slices(loads, ground_of(wanted, shot), wanted.cell_size_m)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), pressing)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, coverage_of(loads))
-    state.analyses[uid] = analysis
+    state.analyses[wanted.scene.uid] = analysis
     state.depths.clear()
     state.depths[_key(wanted, analysis)] = contacts.typical
     return analysis
 
 
-def _hash_of(scene: bpy.types.Scene) -> str:
+def _hash_of(wanted: BakeSettings) -> str:
     """Hash of the inputs of reading a shot that are not in the settings."""
-    wanted = settings.snapshot(scene)
-    return report.hash_inputs(staleness.of_movers(scene.objects, wanted), staleness.of_ground(wanted))
+    objects = settings.scene_named(wanted.scene).objects
+    return report.hash_inputs(staleness.of_movers(objects, wanted), staleness.of_ground(wanted))
 
 
-def _source(ground: bpy.types.Object | None, wanted: BakeSettings) -> _Source:
+def _source(wanted: BakeSettings) -> _Source:
     """Inputs of reading a shot that are in the settings; a handler notices other edits."""
+    scene = settings.scene_with(wanted.scene.uid) if wanted.ground else None
+    ground = scene and scene.softground.ground  # a redraw looks for no object by its name
     beside = [settings.find(name) for name in (*wanted.soft_grounds[1:], *wanted.hard_grounds)]
-    return _parts(wanted)[0], ground and wanted.ground and _place(ground), list(map(_place, filter(None, beside)))
+    return _parts(wanted)[0], ground and _place(ground), list(map(_place, filter(None, beside)))
 
 
 def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:

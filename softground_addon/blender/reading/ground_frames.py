@@ -30,8 +30,8 @@ MESH = 100.0
 """Spacing of the places at which the frame lies for a ground that is still to be created [m]."""
 
 
-def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
-    """The settings, with the frame that the scene is to be read and solved in.
+def framed(wanted: BakeSettings) -> BakeSettings:
+    """The settings, with the frame that their scene is to be read and solved in.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
     direction = felt_gravity(wanted.gravity_direction, bodies)
     if wanted.ground:
         ground = world_matrix(settings.resolve(wanted.ground))
-        if mover_of(settings.resolve(wanted.ground)) and (frame := _moving(scene, wanted, -np.array(direction))):
+        if mover_of(settings.resolve(wanted.ground)) and (frame := _moving(wanted, -np.array(direction))):
             return replace(wanted, frame=frame)
     elif bodies:
         place = world_matrix(bodies[0])[:3, 3] * wanted.unit_scale_m
@@ -55,14 +55,15 @@ def framed(scene: bpy.types.Scene, wanted: BakeSettings) -> BakeSettings:
     return replace(wanted, frame=frame, camera=wanted.camera and wanted.camera.moved(in_metres))
 
 
-def _moving(scene: bpy.types.Scene, wanted: BakeSettings, up: Array) -> GroundFrame | None:
+def _moving(wanted: BakeSettings, up: Array) -> GroundFrame | None:
     """The frame of a ground with a mover; None where the ground stays where it is all the same."""
     assert wanted.ground
+    scene = settings.scene_named(wanted.scene)
     ground, scale = settings.resolve(wanted.ground), wanted.unit_scale_m
     name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
-    units = replace(settings.units_of(scene), frame=GroundFrame(rows(np.linalg.inv(from_origin))))
+    units = replace(wanted.units, frame=GroundFrame(rows(np.linalg.inv(from_origin))))
     beside = [*wanted.hard_grounds, *wanted.soft_grounds[1:]]
     matrices, *of_others = jobs.run(_paths(scene, [ground, *map(settings.resolve, beside)], frames, units))
     axes = axes_of(matrices)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
-import bpy
 import numpy as np
 
 from ...core.errors import InputError
@@ -27,7 +26,6 @@ from . import staleness
 
 @sliced
 def with_hard_objects(
-    scene: bpy.types.Scene,
     wanted: BakeSettings,
     motions: Sequence[CharacterMotion],
     grounds: Sequence[Terrain],
@@ -64,7 +62,7 @@ def with_hard_objects(
     terrain = HardOnSoft(ground, (yield from MeshTerrain.joined.slices(hard)), reach, wet) if hard else ground
     raised = [rest for motion in motions for rest in raised_rests(motion, terrain)]
     yield
-    shown = yield from _tops(_still_meshes(scene, wanted, raised) if raised else (), wanted, bounds)
+    shown = yield from _tops(_still_meshes(wanted, raised) if raised else (), wanted, bounds)
     carried = [(name, top, rests) for name, top in shown if (rests := carried_by(top.heights, raised, terrain))]
     if carried:
         hard += [top for _, top, _ in carried]
@@ -86,8 +84,9 @@ def _tops(
     return tops
 
 
-def _still_meshes(scene: bpy.types.Scene, wanted: BakeSettings, raised: Sequence[RaisedRest]) -> list[ObjectName]:
+def _still_meshes(wanted: BakeSettings, raised: Sequence[RaisedRest]) -> list[ObjectName]:
     """The meshes that a scene shows where soles rest, and that do not move."""
+    scene = settings.scene_named(wanted.scene)
     places = np.array([rest.place for rest in raised]) / wanted.unit_scale_m
     margin = max(rest.near for rest in raised) / wanted.unit_scale_m
     grounds = [settings.resolve(name) for name in wanted.soft_grounds]

@@ -159,7 +159,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     for name, where in [*beside, *((name, "beside the ground") for name in wanted.soft_grounds[1:])]:
         if fault := ground_checks.hard_fault(settings.resolve(name), ground, where):
             raise InputError(fault)
-    return ground_frames.framed(scene, wanted)
+    return ground_frames.framed(wanted)
 
 
 def _check_ground(wanted: BakeSettings) -> None:
@@ -175,8 +175,8 @@ def _check_ground(wanted: BakeSettings) -> None:
         )
 
 
-def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
-    """Motions of the scene's characters below a response layer, and their ground.
+def read_shot(wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Job[Shot]:
+    """Motions of the characters of a scene below a response layer, and their ground.
 
     Raises
     ------
@@ -184,13 +184,13 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
         If a character or the ground cannot be used; names it and the remedy.
     """
     findings: list[Finding] = []
-    motions, rigs = yield from sample_characters(scene, wanted, below, findings)
+    motions, rigs = yield from sample_characters(wanted, below, findings)
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
         layout = yield from meanwhile(Progress("sample", 1.0), created_ground.laid_out.slices(wanted, plan))
         plane = layout.plane if isinstance(plan.terrain, FlatTerrain) else plan.terrain
-        terrain, _, missing = yield from _with_hard(scene, wanted, motions, [plane], np.stack([lower, upper]))
+        terrain, _, missing = yield from _with_hard(wanted, motions, [plane], np.stack([lower, upper]))
         made = Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
         return replace(made, layout=layout)
     yield Progress("sample", 1.0)
@@ -204,7 +204,7 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings, below: LayerKind = L
         surfaces.append(surface)
         soft.append(terrain)
         hard_parts += hard
-    terrain, apart, missing = yield from _with_hard(scene, wanted, motions, soft, bounds, hard_parts)
+    terrain, apart, missing = yield from _with_hard(wanted, motions, soft, bounds, hard_parts)
     shot = Shot(tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*findings, *missing), wanted.frame)
     alone = replace(shot, motions=(), rigs=(), findings=())
     parts = [
@@ -235,14 +235,13 @@ def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, 
 
 
 def _with_hard(
-    scene: bpy.types.Scene,
     wanted: BakeSettings,
     motions: list[CharacterMotion],
     grounds: Sequence[Terrain],
     bounds: Array,
     hard_parts: Sequence[MeshTerrain] = (),
 ) -> Job[tuple[Terrain, list[HardOnSoft], list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(scene, wanted, motions, grounds, bounds, hard_parts)
+    work = hard_ground.with_hard_objects.slices(wanted, motions, grounds, bounds, hard_parts)
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
@@ -266,7 +265,7 @@ def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]
     return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
-def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
+def fit_ground(wanted: BakeSettings) -> Job[GroundPlan]:
     """The ground that fits the walk of the scene's characters.
 
     Raises
@@ -274,19 +273,17 @@ def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
     InputError
         If the characters cannot be read.
     """
-    motions, _ = yield from sample_characters(scene, replace(wanted, response=None))
+    motions, _ = yield from sample_characters(replace(wanted, response=None))
     return (yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions)))
 
 
 def sample_characters(
-    scene: bpy.types.Scene,
-    wanted: BakeSettings,
-    below: LayerKind = LayerKind.RESPONSE,
-    findings: list[Finding] | None = None,
+    wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE, findings: list[Finding] | None = None
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
-    motions, rigs, units = [], [], wanted.units  # what was read is compared later, and is not all settings
+    scene, motions, rigs = settings.scene_named(wanted.scene), [], []
+    units = wanted.units  # what was read is compared later, and is not all settings
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, character in enumerate(wanted.characters):
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
@@ -299,7 +296,7 @@ def sample_characters(
                 legs = {joint: bone for joint, (bone, _) in with_all.joints.items() if joint not in mapping.joints}
                 controls = controls_of(scene.view_layers[0], armature, with_all)
                 poses = RigPoses([*(control.bone for control in controls), *legs.values()], with_skin=wanted.carves)
-            extent = extent_of(scene.unit_settings.scale_length, armature)
+            extent = extent_of(wanted.unit_scale_m, armature)
             grown = extent / character.size_m if character.size_m else 1.0
             job = sample_character(
                 scene,

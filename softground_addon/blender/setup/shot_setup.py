@@ -178,7 +178,7 @@ class SOFTGROUND_OT_create_ground(Reading):
                 return (yield from _taken_as_ground(self.scene, chosen))
         has_first = settings.exists(self.scene.softground.ground)
         wanted = shots.settings_of(self.scene)
-        plan = yield from _planned(self.scene, wanted)
+        plan = yield from _planned(wanted)
         with ExitStack() as drafts:
             now = jobs.Progress("sample", 1.0)
             layout = yield from jobs.meanwhile(now, created_ground.laid_out.slices(wanted, plan))
@@ -199,14 +199,14 @@ class SOFTGROUND_OT_create_ground(Reading):
         return [("INFO", text), *(("WARNING", warning) for warning in plan.warnings)]
 
 
-def _planned(scene: bpy.types.Scene, wanted: BakeSettings) -> jobs.Job[GroundPlan]:
+def _planned(wanted: BakeSettings) -> jobs.Job[GroundPlan]:
     """The ground that fits the walk; if bodies may carve it, by how deep the shot is predicted to be."""
     if wanted.carves:
         with suppress(InputError):  # of a shot that cannot be baked on the ground that it has
-            motions = (yield from analysis.reading(scene)).shot.motions
-            depth = (yield from analysis.working_out_depth(scene)) or 0.0
+            motions = (yield from analysis.reading(settings.scene_named(wanted.scene))).shot.motions
+            depth = (yield from analysis.working_out_depth(wanted)) or 0.0
             return (yield from jobs.meanwhile(jobs.Progress("sample", 1.0), plan_ground.slices(motions, depth)))
-    return (yield from shots.fit_ground(scene, wanted))
+    return (yield from shots.fit_ground(wanted))
 
 
 def _is_as_made(ground: bpy.types.Object, scene: bpy.types.Scene) -> bool:

@@ -99,7 +99,7 @@ def draw_pressed() -> None:
     """Draw the prints that a bake has pressed so far, until the ground shows them; for the viewport's draw handler."""
     context: Any = bpy.context
     pressing = state.pressing
-    if pressing is None or pressing.scene != context.scene.name:
+    if pressing is None or pressing.of != context.scene.session_uid:
         return
     for footprint in pressing.footprints[len(pressing.shapes) :]:
         pressing.shapes.append(_triangles(corners_of(footprint, pressing, context.scene)))
@@ -254,7 +254,7 @@ class SOFTGROUND_OT_read_again(Reading):
     def _job_of(self) -> jobs.Job[bool]:
         with suppress(InputError):  # it says so when the user asks for the depth, or bakes
             yield from analysis.reading(self.scene)
-        return analysis.known(self.scene) is not None
+        return analysis.known(settings.snapshot(self.scene)) is not None
 
     def _show(self, _result: bool) -> None:
         session.redraw(region_type="WINDOW")

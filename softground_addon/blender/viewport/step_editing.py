@@ -85,7 +85,7 @@ class EditJob(ModalJob):
         edits, chosen = self.wanted(ground)
         if edits != baked_ground.record_of(ground).edits:
             bake = yield from step_edits.reading(self.scene)
-            yield from step_edits.editing(self.scene, bake, edits)
+            yield from step_edits.editing(bake, edits)
         return chosen
 
     def wanted(self, ground: bpy.types.Object) -> Wanted:

@@ -155,7 +155,7 @@ def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
 
 def edited(scene, edits):
     """What a button does that changes steps."""
-    yield from step_edits.editing(scene, (yield from step_edits.reading(scene)), edits)
+    yield from step_edits.editing((yield from step_edits.reading(scene)), edits)
 
 
 @pytest.mark.slow

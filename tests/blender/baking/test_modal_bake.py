@@ -12,6 +12,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.operators import modal_bake, modal_job
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.settings import snapshot
 from softground_addon.blender.setup import shot_setup as operators
 from softground_addon.blender.state import state
 from softground_addon.core.composers import pressed_shot
@@ -391,4 +392,4 @@ def test_a_shot_is_read_in_steps_and_leaves_no_trace_where_that_ends(scene):
             next(job)
         job.close()
         assert fingerprints.of_file() == before
-        assert analysis.known(scene) is None
+        assert analysis.known(snapshot(scene)) is None

@@ -217,7 +217,7 @@ def test_rigid_bodies_are_stepped_to_a_late_start_a_frame_at_a_time(scene):
     add_props(scene, [thing])
     scene.softground.frame_start, scene.softground.frame_end = 30, 40
     scene.frame_set(5)
-    reading, shown = read_shot(scene, settings_of(scene)), []
+    reading, shown = read_shot(settings_of(scene)), []
     for _ in reading:
         shown.append(scene.frame_current)
         if scene.frame_current == 32:
@@ -236,7 +236,7 @@ def test_wheels_on_one_frame_are_one_thing_and_share_its_mass(scene):
     rigs.key(parent, "location", {1: (0, 0, 0), 20: (1, 0, 0)})
     (character,) = add_props(scene, wheels)
     assert (character.name, len(character.soles)) == ("Bicycle", 2)
-    (motion,) = jobs.run(read_shot(scene, settings_of(scene))).motions
+    (motion,) = jobs.run(read_shot(settings_of(scene))).motions
     assert motion.centre[0] == pytest.approx([0.5, 0, 0.25], abs=1e-4)
 
 
@@ -385,7 +385,7 @@ def test_a_cane_on_the_hand_prints_with_its_tip_and_carries_its_share(scene):
     rigs.key(cane, "location", {1: (0.3, 0, 0.45), 20: (0.3, 0, 0.45)})
     assert add_object_contacts(scene.softground, character, [cane]) == ["Cane.L"]
     assert character.soles[-1].side == "LEFT"
-    (motion,) = jobs.run(read_shot(scene, settings_of(scene))).motions
+    (motion,) = jobs.run(read_shot(settings_of(scene))).motions
     sole = motion.soles[-1]
     assert sole.lowest() == pytest.approx(np.zeros(len(motion.frames)), abs=1e-4)
     steps = bake(scene, frame_end=20).report["steps"]
@@ -406,7 +406,7 @@ def test_contacts_are_added_from_what_is_selected(scene):
     bpy.ops.object.mode_set(mode="OBJECT")
     limbs = [sole for sole in scene.softground.characters[0].soles if sole.kind == "LIMB"]
     assert {sole.side for sole in limbs} == {"LEFT", "RIGHT"}
-    (motion,) = jobs.run(read_shot(scene, settings_of(scene))).motions
+    (motion,) = jobs.run(read_shot(settings_of(scene))).motions
     assert [sole.sole.prop is not None for sole in motion.soles] == [False, False, True, True]
     # Hands that only swing by change nothing.
     report = bake(scene, frame_end=20).report

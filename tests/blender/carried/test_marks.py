@@ -480,7 +480,7 @@ def test_a_bake_is_outdated_when_marks_are_switched_off(scene):
 
 
 def edit(scene, edits):
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), edits))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), edits))
 
 
 def state_of(obj):

@@ -138,7 +138,7 @@ def assert_gait(animal):
     character = add_character(scene, armature)
     assert sorted(sole.bone for sole in character.soles) == sorted(feet)
     wanted = settings_of(scene)
-    (loads,) = jobs.run(estimate_shot(wanted, jobs.run(read_shot(scene, wanted))))
+    (loads,) = jobs.run(estimate_shot(wanted, jobs.run(read_shot(wanted))))
     steps = (len(loads.contacts.touching) - 1) // (FRAMES - 1)
     touching = loads.contacts.touching[::steps]
     *_, stands = gait(animal)

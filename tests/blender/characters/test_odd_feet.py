@@ -233,7 +233,7 @@ def test_every_foot_that_rests_bears_though_only_the_hind_legs_are_named(scene, 
     character = add_character(scene, armature)
     assert len(character.soles) == 4
     wanted = settings_of(scene)
-    loads = run(estimate_shot(wanted, run(read_shot(scene, wanted))))[0]
+    loads = run(estimate_shot(wanted, run(read_shot(wanted))))[0]
     assert not loads.motion.stands_still
     assert loads.contacts.touching.all()
     shares = loads.forces.forces[..., 2].mean(axis=0) / loads.forces.total[:, 2].mean()

@@ -58,7 +58,7 @@ def seen(animal: Animal, *, skinned: bool = True) -> Seen:
         soles = [{part for part, _ in sole.parts.items()} or {sole.bone} for sole in character.soles]
         feet = [[foot for foot, bones in enumerate(carriers) if bones & parts] for parts in soles]
         wanted = settings_of(scene)
-        shot = run(read_shot(scene, wanted))
+        shot = run(read_shot(wanted))
         loads = run(estimate_shot(wanted, shot))[0]
     except InputError as refusal:
         return Seen([f"GROSS: refused: {refusal}: "], [Finding("refused", "error", "''", "")])

@@ -75,7 +75,7 @@ def steps_of(change=None):
     character = add_character(scene, armature)
     scene.softground.sink_feet = False
     wanted = settings_of(scene)
-    loads = run(estimate_shot(wanted, run(read_shot(scene, wanted))))[0]
+    loads = run(estimate_shot(wanted, run(read_shot(wanted))))[0]
     time = (loads.motion.frames - loads.motion.frames[0]) / loads.motion.frame_rate
     steps = [
         (time[first], time[last - 1], loads.forces.forces[first:last, sole, 2].max())

@@ -22,6 +22,7 @@ from softground_addon.blender.output import sound_exports
 from softground_addon.blender.placement import in_scene
 from softground_addon.blender.playback import own_data
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.settings import snapshot
 from softground_addon.blender.state import state
 from softground_addon.blender.viewport import overlay
 from softground_addon.core.errors import InputError
@@ -434,7 +435,7 @@ def test_a_step_on_a_sailing_deck_can_be_edited(short_walk):
     short_walk.frame_set(20)
     edited = jobs.run(step_edits.reading(short_walk))
     name = edited.record.steps[1].name
-    jobs.run(step_edits.editing(short_walk, edited, {name: StepEdit(move_m=(0.1, 0.0))}))
+    jobs.run(step_edits.editing(edited, {name: StepEdit(move_m=(0.1, 0.0))}))
     prints = baked_ground.record_of(short_walk.softground.ground).edited
     assert len(prints) == len(result.footprints)
     moves = [new.position - old.position for new, old in zip(prints, result.footprints, strict=True)]
@@ -446,11 +447,11 @@ def test_what_a_shot_is_known_by_holds_while_the_deck_moves_on(short_walk):
     deck(short_walk, keyed=sailing)
     known = analysis.read(short_walk)
     short_walk.frame_set(20)
-    assert analysis.known(short_walk) is known
+    assert analysis.known(snapshot(short_walk)) is known
     bpy.data.objects["Place"].location.x = 9
     bpy.data.objects["Place"].keyframe_insert("location", frame=20)
     analysis.look_again()
-    assert analysis.known(short_walk) is None
+    assert analysis.known(snapshot(short_walk)) is None
 
 
 def test_live_mode_presses_a_deck_that_sails(short_walk):

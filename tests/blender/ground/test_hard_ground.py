@@ -161,7 +161,7 @@ def test_feet_on_a_crate_are_within_a_millimetre_of_it_after_clean_feet_and_sink
     )
     scene.softground.sink_feet = True
     wanted = settings_of(scene, grounded=True)
-    shot = jobs.run(read_shot(scene, wanted))
+    shot = jobs.run(read_shot(wanted))
     (motion,) = standing_on(shot.motions, shot.terrain, wanted.response)
     assert stands_on_hard(shot.motions[0], shot.terrain)
     assert motion is shot.motions[0]

@@ -85,9 +85,7 @@ def edit_a_step(chance, scene):
         bake = jobs.run(step_edits.reading(scene))
         name = step_id(chance.choice(bake.record.footprints))
         jobs.run(
-            step_edits.editing(
-                scene, bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)}
-            )
+            step_edits.editing(bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)})
         )
     except InputError:
         pass

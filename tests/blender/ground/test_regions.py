@@ -176,7 +176,7 @@ def test_a_step_that_is_moved_to_another_material_is_pressed_into_that(four):
     editable = jobs.run(step_edits.reading(four))
     number, step = next((n, s) for n, s in enumerate(editable.record.steps) if where(s.baked) == 0)
     edit = StepEdit(move_m=(0.0, -2.4 - float(step.baked.position[1])))
-    jobs.run(step_edits.editing(four, editable, {step.name: edit}))
+    jobs.run(step_edits.editing(editable, {step.name: edit}))
     footprint = baked_ground.record_of(four.softground.ground).steps[number].footprint
     assert footprint.surface == "mud"
     assert footprint.max_depth_m != pytest.approx(step.baked.max_depth_m, rel=0.05)
@@ -364,7 +364,7 @@ def test_what_lies_below_shows_by_default_where_a_layer_is_thin(four, tmp_path, 
     assert set(depths_of_layers(ground)[0]) == {np.float32(four.softground.material.layer_depth)}
     editable = jobs.run(step_edits.reading(four))
     assert editable.made_with.under == "ALWAYS"
-    jobs.run(step_edits.editing(four, editable, {editable.record.steps[0].name: StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(editable, {editable.record.steps[0].name: StepEdit(mute=True)}))
     assert depths_of_layers(ground) is not None
     four.softground.under = "AUTO"
     thin = replace(presets.find("mud"), material=replace(presets.find("mud").material, layer_depth=0.04))

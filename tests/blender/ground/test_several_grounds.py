@@ -277,7 +277,7 @@ def test_an_edit_is_of_the_ground_that_is_shown_and_stays_through_the_next_bake(
     further_grounds.choose(scene.softground, item)
     editable = jobs.run(step_edits.reading(scene))
     step = editable.record.steps[0]
-    jobs.run(step_edits.editing(scene, editable, {step.name: StepEdit(strength=0.5)}))
+    jobs.run(step_edits.editing(editable, {step.name: StepEdit(strength=0.5)}))
     shallow = record_of(crate).edited[0].max_depth_m
     assert shallow < step.baked.max_depth_m
     assert bytes_of(record_of(floor).edited) == on_floor
@@ -293,7 +293,7 @@ def test_steps_are_edited_as_well_once_another_ground_was_listed(crate):
     bake(scene)
     also(crate)
     step = steps_on(scene.softground.ground)[0].name
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step: StepEdit(strength=0.5)}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {step: StepEdit(strength=0.5)}))
     assert record_of(scene.softground.ground).edits == {step: StepEdit(strength=0.5)}
     assert not baked_ground.is_baked(crate)
 
@@ -842,10 +842,10 @@ def test_a_ground_that_is_moved_makes_the_prediction_outdated(crate):
     bpy.context.view_layer.update()
     for obj in (crate, slab):
         analysis.read(scene)
-        assert analysis.known(scene)
+        assert analysis.known(settings.snapshot(scene))
         obj.location.z += 0.01
         bpy.context.view_layer.update()
-        assert not analysis.known(scene)
+        assert not analysis.known(settings.snapshot(scene))
 
 
 @pytest.mark.slow
@@ -985,7 +985,7 @@ def test_the_later_bake_is_heard_whatever_grounds_are_called_by_then_and_whichev
     else:
         bake(scene)
     step = steps_on(crate)[0]
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {step.name: StepEdit(strength=0.5)}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {step.name: StepEdit(strength=0.5)}))
     also(floor)
     assert bake_report.baked_grounds(options) == [crate]
     further_grounds.choose(options, options.grounds[0])

@@ -12,6 +12,7 @@ from softground_addon.blender import session
 from softground_addon.blender.ground import baked_ground, baked_steps, ground_mesh
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.settings import snapshot
 from softground_addon.blender.viewport import overlay, overlay_shapes
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
@@ -49,8 +50,8 @@ def test_live_mode_shows_the_cells_of_each_sole_that_touches_as_the_bake_does(sc
     walker(scene, frames=60)
     bpy.ops.softground.add_character()
     bpy.ops.softground.live()
-    touching = analysis.known(scene).loads[0].contacts.touching
-    frames = analysis.known(scene).loads[0].motion.frames
+    touching = analysis.known(snapshot(scene)).loads[0].contacts.touching
+    frames = analysis.known(snapshot(scene)).loads[0].motion.frames
     shown = {}
     for frame in range(10, 50):
         scene.frame_set(frame)
@@ -98,7 +99,7 @@ def test_the_directory_of_a_record_lies_in_its_tail(scene):
 
 def test_early_prints_cover_their_cells_without_gaps_and_lie_above_the_ground():
     _, (step, *_) = pressed(walk(steps=3), SNOW, 0.01)
-    corners = overlay.corners_of(step, session.Pressing("", FlatTerrain(0.5), None), bpy.context.scene)
+    corners = overlay.corners_of(step, session.Pressing(0, FlatTerrain(0.5), None), bpy.context.scene)
     first, second, third = corners.reshape(-1, 3, 3).transpose(1, 0, 2)
     areas = np.linalg.norm(np.cross(second - first, third - first), axis=1) / 2
     assert areas.sum() == pytest.approx(len(step.contact_cells) * step.cell_size**2)
@@ -108,9 +109,9 @@ def test_early_prints_cover_their_cells_without_gaps_and_lie_above_the_ground():
 @pytest.mark.slow
 def test_a_shot_that_is_forgotten_is_not_kept_by_what_was_drawn_of_it(short_walk):
     analysis.read(short_walk)
-    shown = overlay._footfalls(analysis.known(short_walk))
-    assert overlay._footfalls(analysis.known(short_walk)) is shown, "it is worked out once"
-    known = weakref.ref(analysis.known(short_walk))
+    shown = overlay._footfalls(analysis.known(snapshot(short_walk)))
+    assert overlay._footfalls(analysis.known(snapshot(short_walk))) is shown, "it is worked out once"
+    known = weakref.ref(analysis.known(snapshot(short_walk)))
     analysis.forget()
     gc.collect()
     assert known() is None

@@ -389,7 +389,7 @@ def test_a_bake_is_expected_to_carve_where_feet_sink_beyond_the_ankle(shot):
     for modulus, carves in ((123e3, True), (3e6, False)):
         material.youngs_modulus = modulus
         bpy.ops.softground.predict_depth()
-        assert prediction.fineness(prediction.asked(shot), prediction.of(shot)).is_carved == carves
+        assert prediction.fineness(*prediction.look(shot)).is_carved == carves
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):
@@ -403,10 +403,10 @@ def test_the_depth_to_expect_follows_the_sliders(shot):
 
 def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
     bpy.ops.softground.predict_depth()
-    known, expected = analysis.known(shot), analysis.expected_depth(shot)
+    known, expected = analysis.known(settings.snapshot(shot)), analysis.expected_depth(shot)
     bpy.ops.softground.create_ground()
     bpy.context.view_layer.update()
-    assert analysis.known(shot).contacts is known.contacts
+    assert analysis.known(settings.snapshot(shot)).contacts is known.contacts
     assert analysis.expected_depth(shot) == expected
 
 
@@ -415,11 +415,11 @@ def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
 def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding):
     shot.softground.grounding.use = grounding
     bpy.ops.softground.predict_depth()
-    known, expected = analysis.known(shot), analysis.expected_depth(shot)
+    known, expected = analysis.known(settings.snapshot(shot)), analysis.expected_depth(shot)
     for change in (bpy.ops.softground.bake, bpy.ops.softground.bake, bpy.ops.softground.clear_bake):
         change()
         bpy.context.view_layer.update()
-        assert analysis.known(shot).contacts is known.contacts
+        assert analysis.known(settings.snapshot(shot)).contacts is known.contacts
         assert analysis.expected_depth(shot) == expected
 
 
@@ -427,24 +427,24 @@ def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding
 def test_the_depth_to_expect_holds_on_through_another_look_of_a_baked_ground(shot):
     bpy.ops.softground.predict_depth()
     bpy.ops.softground.bake()
-    known, in_snow = analysis.known(shot), analysis.expected_depth(shot)
+    known, in_snow = analysis.known(settings.snapshot(shot)), analysis.expected_depth(shot)
     assert shot.softground.ground.data.shape_keys  # which Blender takes for edited with the mesh that has them
     for change in (lambda: bpy.ops.softground.load_preset(name="Mud"), bpy.ops.softground.apply_look):
         change()
         bpy.context.view_layer.update()
-        assert analysis.known(shot).contacts is known.contacts
+        assert analysis.known(settings.snapshot(shot)).contacts is known.contacts
     assert analysis.expected_depth(shot) < in_snow
 
 
 @pytest.mark.slow
 def test_the_depth_to_expect_holds_on_through_live_mode(shot):
     bpy.ops.softground.predict_depth()
-    known = analysis.known(shot)
+    known = analysis.known(settings.snapshot(shot))
     bpy.ops.softground.live()
     shot.frame_set(40)
     bpy.ops.softground.live(keep=True)
     bpy.context.view_layer.update()
-    assert analysis.known(shot).contacts is known.contacts
+    assert analysis.known(settings.snapshot(shot)).contacts is known.contacts
 
 
 @pytest.mark.slow
@@ -454,12 +454,12 @@ def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot
     analysis.read(shot)
     ground.location.z += 0.02
     bpy.context.view_layer.update()
-    assert analysis.known(shot) is None
+    assert analysis.known(settings.snapshot(shot)) is None
     analysis.read(shot)
     bpy.ops.object.select_all(action="DESELECT")
     bpy.ops.softground.create_ground()
     assert shot.softground.ground != ground
-    assert analysis.known(shot) is None
+    assert analysis.known(settings.snapshot(shot)) is None
 
 
 @pytest.mark.slow

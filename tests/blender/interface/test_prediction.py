@@ -98,7 +98,7 @@ def test_a_change_ends_what_is_refined(shot, drawing):
     drawing(shot)
     prediction._work_out()
     drawing(shot)
-    state.refining.append(analysis.pressing_all(shot))
+    state.refining.append(analysis.pressing_all(settings.snapshot(shot)))
     next(state.refining[0])
     softer(shot)
     drawing(shot)
@@ -231,7 +231,7 @@ def test_a_bake_ends_the_search_for_a_depth_that_was_typed(shot, drawing):
         pass
     drawing(shot)
     prediction.aim_at(shot, 0.04)
-    jobs.run(prediction.settling(shot))
+    jobs.run(prediction.settling(shot.session_uid))
     assert analysis.expected_depth(shot) == pytest.approx(0.04, rel=0.005)
 
 

@@ -13,6 +13,7 @@ from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.operators import bake_result
 from softground_addon.blender.panels import outdated
 from softground_addon.blender.reading import analysis
+from softground_addon.blender.settings import snapshot
 from tests.blender.response.test_root_motion import FRAMES, on_the_spot
 from tests.blender.shots import walker
 
@@ -51,7 +52,7 @@ def wrong(scene, tmp_path):
 
 @pytest.mark.slow
 def test_the_remedies_that_a_warning_names_are_in_it_and_in_the_panel(wrong):
-    assert analysis.known(wrong) is None
+    assert analysis.known(snapshot(wrong)) is None
     popup = MagicMock()
     drawn = drawn_on(popup.layout.column())
     bake_result._draw_warnings(popup, bpy.context)
@@ -89,7 +90,7 @@ def test_undo_brings_remedies_back_with_their_finding(wrong):
     for named in (IN_PANEL[1:], IN_PANEL):  # first, the character has changed since the bake
         bpy.ops.ed.undo()
         outdated.compare_bake()
-        assert analysis.known(bpy.context.scene) is None
+        assert analysis.known(snapshot(bpy.context.scene)) is None
         assert list(in_panel(bpy.context.scene)) == named
 
 

@@ -201,7 +201,7 @@ def test_a_prediction_is_worked_out_anew_for_other_cells(scene):
     bpy.context.view_layer.update()
     before = analysis.read(scene)
     scene.softground.cell_size *= 3
-    after = jobs.run(analysis.refreshing(scene))
+    after = jobs.run(analysis.refreshing(settings.snapshot(scene)))
     analysis.forget()
     assert after.contacts.typical == analysis.read(scene).contacts.typical != before.contacts.typical > 0
 

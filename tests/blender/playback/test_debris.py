@@ -199,9 +199,9 @@ def test_what_a_muted_step_threw_is_not_there_until_it_is_back(scene):
     before = fingerprints.of_mesh(debris_object.of(ground).data)
     bake = jobs.run(step_edits.reading(scene))
     number = int(values(debris_object.of(ground), "step")[0])
-    jobs.run(step_edits.editing(scene, bake, {step_id(bake.record.footprints[number]): StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(bake, {step_id(bake.record.footprints[number]): StepEdit(mute=True)}))
     assert set(values(debris_object.of(ground), "step")) == set(bake.record.thrown) - {number}
-    jobs.run(step_edits.editing(scene, bake, {}))
+    jobs.run(step_edits.editing(bake, {}))
     assert fingerprints.of_mesh(debris_object.of(ground).data) == before
 
 
@@ -219,7 +219,7 @@ def test_edited_steps_throw_what_a_bake_with_the_same_edits_throws(scene):
         f"{names[1]}+1": StepEdit(move_m=(0.05, 0.0), shift_frames=4),
     }
     before = values(debris_object.of(ground), "step")
-    jobs.run(step_edits.editing(scene, bake, edits))
+    jobs.run(step_edits.editing(bake, edits))
     loaded = record.load(bytes(baked_ground.stored_record(ground)))
     edited, content = fingerprints.of_mesh(debris_object.of(ground).data), record.dump(replace(loaded, about={}))
     report = jobs.run(bake_job.bake(scene)).report
@@ -266,7 +266,7 @@ def test_debris_that_was_deleted_stays_away_from_edited_steps(scene):
     ground = scene.softground.ground
     bpy.data.objects.remove(debris_object.of(ground))
     bake = jobs.run(step_edits.reading(scene))
-    jobs.run(step_edits.editing(scene, bake, {step_id(bake.record.footprints[0]): StepEdit(strength=0.5)}))
+    jobs.run(step_edits.editing(bake, {step_id(bake.record.footprints[0]): StepEdit(strength=0.5)}))
     assert debris_object.of(ground) is None
 
 

@@ -11,6 +11,7 @@ from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.sampling import sampling_scene
+from softground_addon.blender.settings import snapshot
 from tests.blender.shots import walker
 
 IDLE_LINES = 8
@@ -72,11 +73,11 @@ def test_an_edited_action_makes_the_prediction_worthless(scene):
     armature = walker(scene, frames=48)
     bpy.ops.softground.add_character()
     analysis.read(scene)
-    assert analysis.known(scene)
+    assert analysis.known(snapshot(scene))
     action = armature.animation_data.action
     action.update_tag()
     bpy.context.view_layer.update()
-    assert analysis.known(scene) is None
+    assert analysis.known(snapshot(scene)) is None
 
 
 def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene, tmp_path):

@@ -322,7 +322,7 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     muted = min(record_of_bake.carves)
     name = step_id(record_of_bake.footprints[muted])
     heights = recompose(record_of_bake.shaping)
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
     without = baked_ground.record_of(scene.softground.ground)
     assert len(without.shaping) == len(record_of_bake.shaping) - 2
     assert without.carves.keys() == record_of_bake.carves.keys()
@@ -330,7 +330,7 @@ def test_a_muted_step_takes_its_carve_along_and_gives_it_back(scene):
     of = scene.softground.ground, scene.objects
     assert not staleness.reasons(*of, wanted)
     assert staleness.reasons(*of, replace(wanted, carve=False)) == ("The settings have changed",)
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {}))
     again = recompose(baked_ground.record_of(scene.softground.ground).shaping)
     assert again.tiles.keys() == heights.tiles.keys()
     assert all(np.array_equal(again.tiles[key], tile) for key, tile in heights.tiles.items())
@@ -346,7 +346,7 @@ def test_a_moved_step_takes_its_carve_along_at_once_and_so_does_its_copy(scene):
     name = step_id(step)
 
     def edited(edits):
-        jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), edits))
+        jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), edits))
         return baked_ground.record_of(scene.softground.ground)
 
     def lying(records, away=(0.0, 0.0)):

@@ -37,7 +37,7 @@ KNEE = 1.05
 def read(scene):
     """The shot, and when its first character's soles touch."""
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
-    shot = jobs.run(read_shot(scene, wanted, LayerKind.CLEAN_FEET))
+    shot = jobs.run(read_shot(wanted, LayerKind.CLEAN_FEET))
     standing = standing_on(shot.motions, shot.terrain, wanted.response)
     loads = jobs.run(estimate_shot(wanted, replace(shot, motions=standing)))[0]
     return shot, at_scene_frames(loads.contacts.touching, loads.motion.frames, shot.motions[0])

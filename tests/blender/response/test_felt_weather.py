@@ -93,8 +93,8 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     assert np.mean(np.abs(lies[away, 2] - level) < 1e-3) > 0.95  # some lie at the tips of prints
     pieces = positions(obj.data)
     bake = jobs.run(step_edits.reading(opened))  # an edit throws in the same weather
-    jobs.run(step_edits.editing(opened, bake, {step_id(loaded.footprints[0]): StepEdit(mute=True)}))
-    jobs.run(step_edits.editing(opened, bake, {}))
+    jobs.run(step_edits.editing(bake, {step_id(loaded.footprints[0]): StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(bake, {}))
     assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
 

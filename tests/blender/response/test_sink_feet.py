@@ -11,6 +11,7 @@ from softground_addon.blender.characters.selection import set_up_automatically
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.reading import analysis
 from softground_addon.blender.response.character_keys import controls_of
+from softground_addon.blender.settings import snapshot
 from softground_addon.core.errors import InputError
 from softground_addon.core.rig.mapping import RigMapping, SoleSource
 from tests.blender import fingerprints, responders, shots
@@ -129,7 +130,7 @@ def test_a_shot_with_sunk_feet_stays_known_once_it_was_read_also_in_a_file_that_
     scene = bpy.context.scene
     depth = analysis.read(scene) and analysis.expected_depth(scene)
     bpy.context.view_layer.update()
-    assert analysis.known(scene)
+    assert analysis.known(snapshot(scene))
     assert analysis.expected_depth(scene) == depth
 
 

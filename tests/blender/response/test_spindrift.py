@@ -78,7 +78,7 @@ def test_it_goes_with_its_step_and_comes_back(scene):
     _, record_of_bake = bake(scene)
     number = int(ploughed(scene)[1].min())
     name = step_id(record_of_bake.footprints[number])
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {name: StepEdit(mute=True)}))
     assert number not in ploughed(scene)[1]
-    jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), {}))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), {}))
     assert baked_ground.record_of(scene.softground.ground).thrown == record_of_bake.thrown

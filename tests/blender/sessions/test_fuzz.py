@@ -384,7 +384,7 @@ def felt(addon, tmp_path_factory):
     assert bpy.ops.softground.bake() == {"FINISHED"}
     bake = jobs.run(step_edits.reading(scene))
     shoe = {step_id(bake.record.footprints[0]): StepEdit(sole="Shoe")}
-    jobs.run(step_edits.editing(scene, bake, step_soles.edits_with_soles(scene.objects, bake.made_with, shoe)))
+    jobs.run(step_edits.editing(bake, step_soles.edits_with_soles(scene.objects, bake.made_with, shoe)))
     path = tmp_path_factory.mktemp("felt") / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
@@ -413,7 +413,7 @@ def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
         assert isinstance(bake_report.stale_reasons(scene), tuple)
         assert handlers.compare_bake() is None
         with contextlib.suppress(InputError), np.errstate(all="ignore"):
-            jobs.run(step_edits.editing(scene, jobs.run(step_edits.reading(scene)), moved))
+            jobs.run(step_edits.editing(jobs.run(step_edits.reading(scene)), moved))
         with contextlib.suppress(InputError), np.errstate(all="ignore"):
             weather.add(ground)
         bpy.context.view_layer.update()

@@ -10,6 +10,7 @@ from softground_addon.blender.characters.contact_editing import add_object_conta
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import analysis, staleness
+from softground_addon.blender.settings import snapshot
 from tests.blender import rigs, shots
 from tests.blender.grounds import plane
 from tests.tiers import slow_but_one
@@ -150,9 +151,9 @@ def test_what_was_read_at_another_time_scale_gravity_or_unit_is_not_known(scene,
     shots.walker(scene, frames=40)
     bpy.ops.softground.add_character()
     analysis.read(scene)
-    assert analysis.known(scene) is not None
+    assert analysis.known(snapshot(scene)) is not None
     change(scene)
-    assert analysis.known(scene) is None
+    assert analysis.known(snapshot(scene)) is None
 
 
 @pytest.mark.slow

@@ -225,7 +225,7 @@ def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     shown = heights(ground, DISPLAY_KEY)
     preview.end()
     assert fingerprints.of_file() == before
-    jobs.run(step_edits.editing(baked, jobs.run(step_edits.reading(baked)), edits))
+    jobs.run(step_edits.editing(jobs.run(step_edits.reading(baked)), edits))
     np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
 
 
