@@ -14,7 +14,7 @@ from ..core.response import foot_holds, response
 from ..core.response.performance import Performance
 from ..core.response.tilt import TiltGains
 from ..core.rig.mapping import SoleSource
-from ..core.rig.recording import SceneUnits
+from ..core.rig.recording import SceneUnits, Timeline
 from ..core.settings import DOWN, BakeSettings, CharacterSettings, GroundSettings, ObjectName, ResponseOptions
 from ..core.weather import felt_weather, weather
 from . import further_grounds, ground_slots, tread_images
@@ -135,17 +135,11 @@ def material_of(values: Any) -> GroundMaterial:
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 
-def frame_rate_of(scene: bpy.types.Scene) -> float:
-    """Scene frames per second [Hz]."""
-    return float(scene.render.fps / scene.render.fps_base)
-
-
-def time_stretch_of(scene: bpy.types.Scene) -> float:
-    """Frames of the animation per frame of the scene: 1 unless its time is remapped.
-
-    Keys, strips, nodes and caches count the animation's frames; the timeline, and with it a bake, the scene's.
-    """
-    return float(scene.render.frame_map_old / scene.render.frame_map_new)
+def timeline_of(scene: bpy.types.Scene) -> Timeline:
+    """The frames of a scene, as they are now."""
+    render = scene.render
+    rate, stretch = render.fps / render.fps_base, render.frame_map_old / render.frame_map_new
+    return Timeline(scene.frame_start, scene.frame_end, float(rate), float(stretch))
 
 
 LONGEST_MAP = 900
@@ -181,10 +175,10 @@ def gravity_direction_of(scene: bpy.types.Scene) -> tuple[float, float, float]:
 
 def units_of(scene: bpy.types.Scene) -> SceneUnits:
     """Frames, lengths and gravity of a scene, as they are now; the Earth's gravity where it is switched off."""
-    pull = float(scene.gravity.length) if scene.use_gravity else 0.0
+    timeline, pull = timeline_of(scene), float(scene.gravity.length) if scene.use_gravity else 0.0
     return SceneUnits(
-        frame_rate=frame_rate_of(scene),
-        time_stretch=time_stretch_of(scene),
+        frame_rate=timeline.frame_rate,
+        time_stretch=timeline.stretch,
         gravity_m_s2=typed(pull if pull > 0 else STANDARD_GRAVITY),
         unit_scale_m=typed(scene.unit_settings.scale_length),
     )

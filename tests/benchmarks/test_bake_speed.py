@@ -12,6 +12,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from tests.benchmarks.bars import below, note
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
@@ -80,7 +81,8 @@ def test_keys_are_read_in_half_the_time_in_which_they_are_evaluated(scene):
     mapping, frames = map_rig(armature), range(1, 501)
 
     def milliseconds():
-        sampling, started = sample_character(scene, armature, mapping, mass=70.0, frames=frames), time.process_time()
+        take, started = Take.about(armature, scene, frames), time.process_time()
+        sampling = sample_character(take, armature, mapping, mass=70.0)
         while next(sampling) < len(frames):
             pass
         sampling.close()

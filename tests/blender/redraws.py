@@ -26,7 +26,7 @@ def redraw(context):
             panel = SimpleNamespace(layout=Layout())
             panel.fields = lambda panel=panel: SidebarPanel.fields(panel)
             cls.draw(panel, context)
-    prediction.of(context.scene)  # the overlay's
+    prediction.look(context.scene)[1]  # the overlay's
     handlers.notice_edits(context.scene, context.view_layer.depsgraph)
     handlers.follow_frame(context.scene, context.view_layer.depsgraph)
     bpy.app.timers.unregister(prediction.look_anew)

@@ -11,6 +11,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from softground_addon.blender.settings import character_of
 from softground_addon.core.legs.foot_placement import lowest_clearance, posed_points
 from softground_addon.core.legs.grounding import leg_soles
@@ -204,15 +205,8 @@ def source_motion(scene, character=None):
     """The character without its layer."""
     character = character or scene.softground.characters[0]
     options = scene.softground
-    return run(
-        sample_character(
-            scene,
-            character.armature,
-            mapping_of(character),
-            mass=character.mass,
-            frames=range(options.frame_start, options.frame_end + 1),
-        )
-    )
+    take = Take.about(character.armature, scene, range(options.frame_start, options.frame_end + 1))
+    return run(sample_character(take, character.armature, mapping_of(character), mass=character.mass))
 
 
 def gaps_on_the_rig(scene, result, terrain, character=None):

@@ -39,3 +39,22 @@ def test_an_attribute_or_property_of_blenders_data_is_named_once():
     )
     assert said
     assert {name: times for name, times in said.items() if times > 1} == {}
+
+
+def test_few_functions_take_a_scene_and_none_takes_one_beside_a_snapshot_which_knows_it():
+    signatures = {
+        f"{path}:{node.lineno} {node.name}": {
+            argument.arg: ast.unparse(argument.annotation or ast.Constant("")) for argument in taken
+        }
+        for path, nodes in CODE.items()
+        for node in nodes
+        if isinstance(node, ast.FunctionDef)
+        for taken in [(*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+    }
+    taking = {
+        name: [*kinds.values()]
+        for name, kinds in signatures.items()
+        if "scene" in kinds or "bpy.types.Scene" in kinds.values()
+    }
+    assert 50 < len(taking) <= 100
+    assert [name for name, kinds in taking.items() if "BakeSettings" in kinds] == []

@@ -17,14 +17,15 @@ def loads_in_blender(scene, body, motion, terrain=None):
     from softground_addon.blender.jobs import run
     from softground_addon.blender.rigs.rig_mapping import map_rig
     from softground_addon.blender.sampling.rig_sampling import sample_character
+    from softground_addon.blender.sampling.take import Take
     from softground_addon.core.loads.estimate import estimate_loads
 
     armature = create_character("Body", body, scene.collection)
     write_action(armature, motion, "Motion", first_frame=0)
     scene.render.fps = round(motion.frame_rate)
     scene.render.fps_base = round(motion.frame_rate) / motion.frame_rate
-    frames = range(len(motion.hips))
-    sampled = run(sample_character(scene, armature, map_rig(armature), mass=body.mass, frames=frames))
+    take = Take.about(armature, scene, range(len(motion.hips)))
+    sampled = run(sample_character(take, armature, map_rig(armature), mass=body.mass))
     return estimate_loads(sampled, terrain or FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
 

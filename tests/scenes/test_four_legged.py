@@ -147,6 +147,7 @@ class TestInBlender:
         from softground_addon.blender.jobs import run
         from softground_addon.blender.rigs.rig_mapping import map_rig
         from softground_addon.blender.sampling.rig_sampling import sample_character
+        from softground_addon.blender.sampling.take import Take
         from softground_addon.core.ground.heightfield import FlatTerrain
         from softground_addon.core.loads.estimate import estimate_loads
         from softground_addon.core.rig.mapping import RigMapping, SoleSource
@@ -160,7 +161,7 @@ class TestInBlender:
             SoleSource(f"{bone}.{side}", side, bone=f"{bone}.{side}") for bone in ("foot", "hand") for side in SIDES
         ]
         mapping = RigMapping(map_rig(armature).joints, tuple(soles))
-        sampled = run(sample_character(scene, armature, mapping, mass=dog.mass, frames=range(120)))
+        sampled = run(sample_character(Take.about(armature, scene, range(120)), armature, mapping, mass=dog.mass))
         return estimate_loads(sampled, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
     @pytest.mark.slow

@@ -8,6 +8,7 @@ import bpy
 
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from softground_addon.core.motion.motion import CharacterMotion
 
 
@@ -50,8 +51,8 @@ def motion_of_bvh(
         scene.render.fps_base = scene.render.fps / rate
     armature = bpy.context.view_layer.objects.active
     start, end = armature.animation_data.action.frame_range
-    frames = range(round(start), round(end) + 1)
-    sampling = sample_character(scene, armature, map_rig(armature), mass=mass, frames=frames)
+    take = Take.about(armature, scene, range(round(start), round(end) + 1))
+    sampling = sample_character(take, armature, map_rig(armature), mass=mass)
     while True:
         try:
             next(sampling)

@@ -247,11 +247,7 @@ def _read(wanted: BakeSettings, *, write: bool) -> Job[tuple[Shot, list[Finding]
 
 
 def write_prints(
-    wanted: BakeSettings,
-    shot: Shot,
-    record: BakeRecord,
-    debris: Debris | None,
-    sole_length: float,
+    wanted: BakeSettings, shot: Shot, record: BakeRecord, debris: Debris | None, sole_length: float
 ) -> Job[tuple[Published, list[Finding]]]:
     """Put the prints on the ground, all of them in the last step; with what the user should know of that.
 

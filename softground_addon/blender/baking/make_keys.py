@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, floor
+from typing import Any
 
 import bpy
 import numpy as np
@@ -14,6 +15,7 @@ from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import axis_angles, euler_angles, quaternions, without_leaps
 from ...core.numerics.rigid import unit
 from ...core.record.edits import mesh_soles
+from ...core.rig.recording import Timeline
 from .. import settings
 from ..animation_layer.constraint_layer import check_layerable, is_own, owners_of, take_off
 from ..animation_layer.layer_curves import LayerCurve, add_curve, assign_action, new_action, path_of_bone
@@ -26,6 +28,7 @@ from ..response import response_job
 from ..response.character_keys import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ..rigs.frame_ranges import animated_frames
 from ..sampling.sampling_scene import depsgraph_at, object_named, sampling_scene
+from ..sampling.take import Take
 from ..translation import translated
 from . import bake_report
 
@@ -88,8 +91,10 @@ def make_keys(scene: bpy.types.Scene) -> Job[tuple[MadeKeys, ...]]:
         _check(armature)
     names = [armature.name_full for armature in armatures]
     read = []
+    user, timeline, units = settings.name_of(scene), settings.timeline_of(scene), settings.units_of(scene)
     for number, name in enumerate(names):
-        read.append((yield from _read(scene, name, number / len(names), 1 / len(names))))
+        take = Take(user, _frames(scene.softground, timeline, object_named(name)), units)
+        read.append((yield from _read(take, name, number / len(names), 1 / len(names))))
     fresh = not bake_report.stale_reasons(scene)
     made = tuple(_assign(object_named(name), curves) for name, curves in zip(names, read, strict=True))
     if fresh:
@@ -129,16 +134,16 @@ def _check(armature: bpy.types.Object) -> None:
         )
 
 
-def _read(scene: bpy.types.Scene, name: str, start: float, share: float) -> Job[dict[str, list[LayerCurve]]]:
+def _read(take: Take, name: str, start: float, share: float) -> Job[dict[str, list[LayerCurve]]]:
     """Curves of what is seen of each bone with a layer that keys can pose, by bone."""
     armature = object_named(name)
-    stretch, frames = settings.time_stretch_of(scene), _frames(scene, armature)
+    frames, units = take.frames, take.units
     bones = list(owners_of(armature))
     watched = list(filter(None, bones)) or [armature.pose.bones[0].name]
     poses = np.empty((len(frames), len(bones), 4, 4))
     turns: dict[str, list[tuple[float, ...]]] = {bone: [] for bone in bones}
     places = np.empty((len(frames), len(bones), 3))
-    with sampling_scene(scene, name, watched, ()) as temporary:
+    with sampling_scene(take.scene, name, watched, ()) as temporary:
         for done, frame in enumerate(frames):
             evaluated = object_named(name).evaluated_get(depsgraph_at(temporary, frame))
             for place, bone in enumerate(bones):
@@ -147,7 +152,7 @@ def _read(scene: bpy.types.Scene, name: str, start: float, share: float) -> Job[
                 places[done, place] = owner.location
                 turns[bone].append(tuple(owner.rotation_euler[:]))
             yield Progress("sample", start + share * (done + 1) / len(frames))
-    times, size = np.array(frames) * stretch, settings.units_of(scene).unit_scale_m * armature.matrix_world.median_scale
+    times, size = np.array(frames) * units.time_stretch, units.unit_scale_m * armature.matrix_world.median_scale
     curves: dict[str, list[LayerCurve]] = {}
     for place, bone in enumerate(bones):
         owner = armature.pose.bones[bone] if bone else armature
@@ -197,11 +202,10 @@ def _turns(mode: str, poses: Array, euler: Array) -> tuple[str, Array, float]:
     return "rotation_euler", euler_angles(axes, mode, euler), ANGLE_TOLERANCE
 
 
-def _frames(scene: bpy.types.Scene, armature: bpy.types.Object) -> range:
+def _frames(options: Any, timeline: Timeline, armature: bpy.types.Object) -> range:
     """The frames of the bake, and those beyond in which the character's own curves move it, at most to the end of the
     scene; not those in which only its parents go on."""
-    options, stretch = scene.softground, settings.time_stretch_of(scene)
-    animated = [frame / stretch for frame in animated_frames(scene, armature, alone=True) or ()]
+    animated = [frame / timeline.stretch for frame in animated_frames(timeline, armature, alone=True) or ()]
     first, last = min([options.frame_start, *animated]), max([options.frame_end, *animated])
     return range(floor(first), ceil(last) + 1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 import bpy
@@ -53,8 +53,8 @@ def scene_findings(wanted: BakeSettings, shot: Shot) -> list[Finding]:
             object_named(sole.object) for character in wanted.characters for sole in character.soles if sole.object
         ),
         *_followed_shapes(wanted),
-        *_crowds(scene.objects, scene.view_layers[0], wanted),
-        *_unseen_ground(scene.objects, scene.view_layers[0], wanted),
+        *_crowds(scene, staleness.bodies_of(scene.objects, wanted)),
+        *_unseen_ground(scene, find(wanted.ground) if wanted.ground else None),
         *_rigs_below(scene.objects, wanted),
         *_edited_plants(),
         *_gravity(scene.gravity if scene.use_gravity else Vector(), wanted),
@@ -224,25 +224,22 @@ def shape_findings(objects: Iterable[bpy.types.Object]) -> list[Finding]:
     ]
 
 
-def _crowds(objects: settings.Objects, view_layer: bpy.types.ViewLayer, wanted: BakeSettings) -> Sequence[Finding]:
+def _crowds(scene: bpy.types.Scene, bodies: Collection[bpy.types.Object]) -> Sequence[Finding]:
     """Copies of what prints that are instances."""
-    showing = instancers(objects, view_layer, staleness.bodies_of(objects, wanted))
+    showing = instancers(scene, bodies)
     return [
         crowd_finding([name for name, other in showing.items() if other == shown], shown)
         for shown in dict.fromkeys(showing.values())
     ]
 
 
-def _unseen_ground(
-    objects: settings.Objects, view_layer: bpy.types.ViewLayer, wanted: BakeSettings
-) -> Iterator[Finding]:
+def _unseen_ground(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> Iterator[Finding]:
     """A ground that is in another scene, or in none, so that its prints are seen there alone."""
-    ground = find(wanted.ground) if wanted.ground else None
-    if ground is not None and all(obj != ground for obj in objects) and not instancers(objects, view_layer, [ground]):
+    if ground is not None and ground.name not in scene.objects and not instancers(scene, [ground]):
         yield Finding(
             "unseen_ground",
             "warning",
-            f"Ground '{ground.name}' is not in scene '{wanted.scene.name}', where its prints are not seen",
+            f"Ground '{ground.name}' is not in scene '{scene.name}', where its prints are not seen",
             "link it there (Object > Link/Transfer Data > Link Objects to Scene), or choose another one.",
         )
 

@@ -30,7 +30,7 @@ def cling(scene: bpy.types.Scene, character: Any) -> int:
     meshes = [obj for obj in every if not (obj.library or obj.parent_type == "BONE" or barrier_on(obj))]
     if not (meshes and soles):
         raise InputError(f"'{armature.name}' deforms no mesh that stands on its bones.")
-    clinging.cling(scene, armature, soles, meshes, _steps(scene, armature, soles))
+    clinging.cling(settings.units_of(scene), armature, soles, meshes, _steps(scene.softground, armature, soles))
     return len(meshes)
 
 
@@ -44,17 +44,17 @@ def follow(name: ObjectName) -> None:
         every = meshes_on(scene.objects, armature) if armature else ()
         meshes = [obj for obj in every if modifier_with(obj, clinging.is_clinging)]
         if meshes and (soles := _soles_of(character)):
-            clinging.cling(scene, armature, soles, meshes, _steps(scene, armature, soles))
+            clinging.cling(settings.units_of(scene), armature, soles, meshes, _steps(scene.softground, armature, soles))
 
 
 def _soles_of(character: Any) -> list[Any]:
     return [sole for sole in character.soles if sole.bone in character.armature.data.bones]
 
 
-def _steps(scene: bpy.types.Scene, armature: bpy.types.Object, soles: Sequence[Any]) -> Iterator[clinging.Step]:
+def _steps(options: Any, armature: bpy.types.Object, soles: Sequence[Any]) -> Iterator[clinging.Step]:
     """The steps of some soles of a character on all grounds."""
     names = [sole.name for sole in soles]
-    baked = (ground for ground in settings.grounds_of(scene.softground) if baked_ground.is_baked(ground))
+    baked = (ground for ground in settings.grounds_of(options) if baked_ground.is_baked(ground))
     for record in map(baked_ground.record_of, baked):
         stretch = baked_ground.units_of(record.about["inputs"]).time_stretch
         for step in record.edited:

@@ -13,6 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.rig.recording import SceneUnits
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_graph import NodeGraph
@@ -40,16 +41,14 @@ def is_clinging(tree: Any) -> bool:
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
-def cling(
-    scene: bpy.types.Scene, armature: Any, soles: Sequence[Any], meshes: Sequence[Any], steps: Iterable[Step]
-) -> None:
+def cling(units: SceneUnits, armature: Any, soles: Sequence[Any], meshes: Sequence[Any], steps: Iterable[Step]) -> None:
     """Let cling to meshes of a character what it waded in by its steps, and by no others."""
     with none_left_if_it_fails():
-        group = _group(_table(armature, soles, meshes, steps), soles, scene)
+        group = _group(_table(armature, soles, meshes, steps), soles, units)
     for obj in meshes:
         modifier = modifier_with(obj, is_clinging) or put(obj, NAME, group, 0)
         modifier.node_group = group
-        set_inputs(modifier, {"Metres": obj.matrix_world.median_scale * scene.unit_settings.scale_length})
+        set_inputs(modifier, {"Metres": obj.matrix_world.median_scale * units.unit_scale_m})
     bpy.data.batch_remove({tree for tree in bpy.data.node_groups if is_clinging(tree) and not tree.users})
 
 
@@ -72,14 +71,14 @@ def _table(armature: Any, soles: Sequence[Any], meshes: Iterable[Any], steps: It
     return table
 
 
-def _group(table: bpy.types.Object, soles: Sequence[Any], scene: bpy.types.Scene) -> bpy.types.NodeTree:
+def _group(table: bpy.types.Object, soles: Sequence[Any], units: SceneUnits) -> bpy.types.NodeTree:
     """The node group, for a table with the steps of some soles."""
     graph = NodeGraph(new_group(NAME, MARK, INPUTS))
     given, frame = graph.node("NodeGroupInput").outputs, graph.number(graph.frame())
     half, metres = (graph.number(given[name]) for name, *_ in INPUTS)
     steps = graph.node("GeometryNodeObjectInfo", {"Object": table}, transform_space="RELATIVE").outputs["Geometry"]
     of, middle, depth = (graph.number(graph.attribute(name)) for name in OF_STEPS)
-    age, second = (frame - middle).at_least(0.0), scene.render.fps / scene.render.fps_base
+    age, second = (frame - middle).at_least(0.0), units.frame_rate
     depth = depth * np.exp(age * (-log(2.0) / second) / half) * (1.0 - (middle - frame).above(0.0))
     nearest, clings = graph.number(1e6), graph.number(0.0)
     for number, sole in enumerate(soles):
@@ -87,7 +86,7 @@ def _group(table: bpy.types.Object, soles: Sequence[Any], scene: bpy.types.Scene
         most = graph.node("GeometryNodeAttributeStatistic", {"Geometry": steps, **inputs}).outputs["Max"]
         place = graph.at_index(steps, graph.position(), number)
         away = graph.number(graph.vector("DISTANCE", graph.position(), place, output="Value")) * metres
-        away = away - FLAT * scene.unit_settings.scale_length * (sole.kind == "FOOT")
+        away = away - FLAT * units.unit_scale_m * (sole.kind == "FOOT")
         closer = graph.compare("LESS_THAN", away.socket, nearest.socket)
         clings = graph.number(graph.choose("FLOAT", closer, clings.socket, most))
         nearest = away.at_most(nearest)

@@ -13,6 +13,7 @@ from ...core.motion.sole_motion import shortest_length
 from ...core.motion.units import scale_to_metres
 from ...core.rig.bare_body import body_motion
 from ...core.rig.mapping import RigMapping
+from ...core.rig.recording import Timeline
 from .. import jobs
 from ..ground_presets import fit_cells, take_defaults
 from ..properties import SoftGroundCharacter
@@ -20,7 +21,8 @@ from ..rigs.frame_ranges import animated_frames
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
-from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, time_stretch_of
+from ..sampling.take import Take
+from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, timeline_of
 from .import_fixes import extent_of, is_captured, mass_of, put_under, sizes_of
 from .recognition import SHARE, Recognised, recognise, recognise_body
 
@@ -57,7 +59,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
             f"'{armature.name}' is already a character: correct its bones in Properties > Physics, or remove it first."
         )
     rig = name_of(armature)
-    recognised = yield from recognise(scene, armature, animated_frames(scene, armature))
+    recognised = yield from recognise(scene, armature, animated_frames(timeline_of(scene), armature))
     length = yield from _shortest_sole(scene, resolve(rig), recognised)
     armature, mapping = resolve(rig), recognised.mapping
     known = free_name(settings.characters, armature.name)
@@ -66,9 +68,9 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     _fill(scene.unit_settings.scale_length, character, mapping)
     character.mass = mass_of(character) or character.mass
     settings.active_character = len(settings.characters) - 1
-    take_frames(scene, animated_frames(scene, armature))
+    take_frames(settings, timeline_of(scene), animated_frames(timeline_of(scene), armature))
     character.sole_length = length
-    fit_ground(scene.softground)
+    fit_ground(settings)
     return character
 
 
@@ -85,7 +87,8 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     settings = scene.softground
     if any(character.body == body for character in settings.characters):
         raise InputError(f"'{body.name}' is already a character: remove it first to recognise it again.")
-    name, frames = name_of(body), body_frames(scene, body)
+    name, timeline = name_of(body), timeline_of(scene)
+    frames = body_frames(timeline, body)
     recognised = yield from recognise_body(scene, name)
     assert recognised.body is not None
     if not recognised.mapping.soles:
@@ -99,10 +102,9 @@ def adding_body(scene: bpy.types.Scene, body: bpy.types.Object) -> jobs.Job[Soft
     _fill(scene.unit_settings.scale_length, character, recognised.mapping)
     character.mass = mass_of(character) or character.mass
     settings.active_character = len(settings.characters) - 1
-    stretch = time_stretch_of(scene)
-    take_frames(scene, (round(frames[0] * stretch), round(frames[1] * stretch)))
+    take_frames(settings, timeline, (round(frames[0] * timeline.stretch), round(frames[1] * timeline.stretch)))
     character.sole_length = length
-    fit_ground(scene.softground)
+    fit_ground(settings)
     return character
 
 
@@ -125,11 +127,12 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
         if recognised.body:
             reading = body_motion(armature.name, recognised.body, mapping, poses, mass=1.0)
         else:
-            reading = recorded_motion(scene, armature, mapping, poses, recognised.skin, mass=1.0)
+            reading = recorded_motion(scene.view_layers[0], armature, mapping, poses, recognised.skin, mass=1.0)
     else:
-        first, last = _frames_of_scene(scene, animated_frames(scene, armature))
+        timeline = timeline_of(scene)
+        first, last = _frames_of_scene(timeline, animated_frames(timeline, armature))
         frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
-        reading, count = sample_character(scene, armature, mapping, mass=1.0, frames=frames), len(frames)
+        reading, count = sample_character(Take.about(armature, scene, frames), armature, mapping, mass=1.0), len(frames)
     try:
         motion = yield from jobs.counted(reading, "sample", count, share=SHARE)
     except InputError:  # it says so when the user bakes
@@ -140,17 +143,16 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
     return shortest_length(min(length, longest) if is_limb else length for is_limb, length in lengths)
 
 
-def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:
-    """The scene's frames at which an animation plays; all of them without one.
+def _frames_of_scene(timeline: Timeline, frames: tuple[int, int] | None) -> tuple[int, int]:
+    """The frames of the scene at which an animation plays; all of them without one.
 
     A pose of one frame is held: its own, or that of an NLA strip, which lasts a frame at least.
     """
     if not frames:
-        return scene.frame_start, scene.frame_end
-    stretch = time_stretch_of(scene)
-    first, last = floor(frames[0] / stretch), ceil(frames[1] / stretch)
+        return timeline.start, timeline.end
+    first, last = floor(frames[0] / timeline.stretch), ceil(frames[1] / timeline.stretch)
     if frames[1] - frames[0] <= 1:
-        last = first + ceil(POSE_TIME * scene.render.fps / scene.render.fps_base)
+        last = first + ceil(POSE_TIME * timeline.frame_rate)
     return first, last
 
 
@@ -165,18 +167,18 @@ def fit_ground(options: Any) -> None:
     fit_cells(options)
 
 
-def take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
+def take_frames(options: Any, timeline: Timeline, frames: tuple[int, int] | None) -> None:
     """Bake the frames of the first character; widen the range for further ones."""
+    is_first = len(characters_of(options)) == 1
     if not frames:
-        if len(characters_of(scene.softground)) == 1:
-            scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
+        if is_first:
+            options.frame_start, options.frame_end = timeline.start, timeline.end
         return
-    settings = scene.softground
-    start, end = _frames_of_scene(scene, frames)
-    if len(characters_of(scene.softground)) > 1:
-        start, end = min(settings.frame_start, start), max(settings.frame_end, end)
-    settings.frame_start, settings.frame_end = start, end
-    settings.animated_frames = start, end
+    start, end = _frames_of_scene(timeline, frames)
+    if not is_first:
+        start, end = min(options.frame_start, start), max(options.frame_end, end)
+    options.frame_start, options.frame_end = start, end
+    options.animated_frames = start, end
 
 
 def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
@@ -192,7 +194,7 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     factor = scale_to_metres(size, captured=is_captured(character))
     if armature is None or factor == 1.0:
         raise InputError(f"'{title_of(character)}' is {size:.2g} m in size: its scale needs no fix.")
-    empty = put_under(scene, armature, "Scale")
+    empty = put_under(scene.collection, armature, "Scale")
     empty.scale = empty.scale * factor
     is_typed = not isclose(character.mass, mass_of(character), rel_tol=1e-6)
     character.size, character.sole_length = character.size * factor, character.sole_length * factor
@@ -215,7 +217,7 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     """
     armature = scene.softground.characters[number].armature
     require_armature(armature)
-    mapping = (yield from recognise(scene, armature, animated_frames(scene, armature))).mapping
+    mapping = (yield from recognise(scene, armature, animated_frames(timeline_of(scene), armature))).mapping
     if not mapping.soles:
         raise InputError(f"No feet found in '{armature.name}': {CHOOSE_CONTACTS}.")
     _fill(scene.unit_settings.scale_length, scene.softground.characters[number], mapping)

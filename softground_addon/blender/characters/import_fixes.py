@@ -17,7 +17,7 @@ from ...core.rig.rig_at_rest import sizes_at_rest
 from ..compat import HAS_SLOTS, action_curves, slot_of
 from ..rigs.frame_ranges import ancestors
 from ..sampling.skin_sampling import meshes_on
-from ..settings import character_of, frame_rate_of, time_stretch_of
+from ..settings import character_of, units_of
 
 
 def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
@@ -78,12 +78,12 @@ PUT_UNDER = "softground_empty"
 
 
 def put_under(
-    scene: bpy.types.Scene,
+    collection: bpy.types.Collection,
     armature: bpy.types.Object,
     purpose: str,
     is_fit: Callable[[bpy.types.Object], object] = bool,
 ) -> bpy.types.Object:
-    """Hang a character, with the meshes that it deforms, on an empty at the origin; whatever animates it stays.
+    """Hang a character, with the meshes of a collection that it deforms, on an empty at the origin; its keys stay.
 
     It is the one that was made for this purpose before, wherever the user has put that since, if it is still fit for
     it, or else a new one above all.
@@ -94,7 +94,7 @@ def put_under(
         If it is linked from another file.
     """
     before = next((obj for obj in ancestors(armature) if obj.get(PUT_UNDER) == purpose and is_fit(obj)), None)
-    tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene.objects, armature)))
+    tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(collection.all_objects, armature)))
     linked = next((obj for obj in ([before] if before else tops) if obj.library), None)
     if linked is not None:
         raise InputError(
@@ -105,7 +105,7 @@ def put_under(
         return before
     empty = bpy.data.objects.new(f"{armature.name} {purpose}", None)
     empty[PUT_UNDER] = purpose
-    (armature.users_collection or (scene.collection,))[0].objects.link(empty)
+    (armature.users_collection or (collection,))[0].objects.link(empty)
     for obj in tops:
         obj.parent = empty
         obj.matrix_parent_inverse.identity()
@@ -122,21 +122,22 @@ def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDA
     InputError
         If it is linked from another file.
     """
-    empty, options, stretch = put_under(scene, armature, "Travel", _travels), scene.softground, time_stretch_of(scene)
+    empty = put_under(scene.collection, armature, "Travel", _travels)
+    options, units = scene.softground, units_of(scene)
     if not _travels(empty):
         for frame in (options.frame_start, options.frame_end):
-            empty.keyframe_insert("location", frame=frame * stretch)
+            empty.keyframe_insert("location", frame=frame * units.time_stretch)
         for curve in _travels(empty):
             curve.extrapolation = "LINEAR"
             for key in curve.keyframe_points:
                 key.interpolation = "LINEAR"
     above = empty.parent.matrix_world @ empty.matrix_parent_inverse if empty.parent else Matrix()
-    per_second = np.linalg.pinv(np.array(above)[:3, :3])[:, :2] @ velocity / scene.unit_settings.scale_length
+    per_second = np.linalg.pinv(np.array(above)[:3, :3])[:, :2] @ velocity / units.unit_scale_m
     for curve in _travels(empty):
-        slope = per_second[curve.array_index] / (frame_rate_of(scene) * stretch)
+        slope = per_second[curve.array_index] / (units.frame_rate * units.time_stretch)
         for key in curve.keyframe_points:
             for point in (key.handle_left, key.handle_right, key.co):
-                point.y += slope * (point.x - options.frame_start * stretch)
+                point.y += slope * (point.x - options.frame_start * units.time_stretch)
         curve.update()
         curve.id_data.update_tag()
 

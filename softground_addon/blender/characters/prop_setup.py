@@ -14,6 +14,7 @@ from ..properties import SoftGroundCharacter
 from ..rigs.frame_ranges import ancestors, animated_frames
 from ..sampling.prop_extraction import surface_of
 from ..sampling.rig_recording import is_simulated
+from ..settings import timeline_of
 from .character_setup import LONGEST_OF_LIMBS, fit_ground, take_frames
 from .contact_editing import check_printable
 
@@ -58,7 +59,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
             sole.name, sole.object = obj.name, obj
         added.append(character)
         for obj in members:
-            take_frames(scene, _moving_frames(scene, obj))
+            take_frames(scene.softground, timeline_of(scene), _moving_frames(scene, obj))
         fit_ground(scene.softground)
     scene.softground.active_character = len(scene.softground.characters) - 1
     return added
@@ -87,4 +88,4 @@ def _moving_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, 
     if is_simulated(obj) and scene.rigidbody_world:
         cache = scene.rigidbody_world.point_cache
         return max(cache.frame_start, scene.frame_start), min(cache.frame_end, scene.frame_end)
-    return animated_frames(scene, obj)
+    return animated_frames(timeline_of(scene), obj)

@@ -21,13 +21,13 @@ from ...core.rig.skin_mass import skin_mass
 from ...core.rig.sole_extraction import bone_families
 from ...core.settings import ObjectName
 from .. import jobs
-from ..placement import units_about
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import record
 from ..sampling.skin_sampling import read_skin
-from ..settings import name_of, resolve
+from ..sampling.take import Take
+from ..settings import name_of, resolve, timeline_of
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
@@ -100,16 +100,15 @@ def recognise(
     if skin is None:
         bare = _on_all_fours(armature, _mapped(armature, skinned=False), _mapped(armature, named=False, skinned=False))
         return Recognised(bare if bare.soles else _mapped(armature, posed=True))
-    units = units_about(scene, armature)
-    samples = range(scene.frame_current, scene.frame_current + 1)
+    take = Take.about(armature, scene, range(scene.frame_current, scene.frame_current + 1))
     moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
     if frames and moves:
-        first, last = (round(frame / units.time_stretch) for frame in frames)
-        samples = range(first, min(last, first + MOST_FRAMES) + 1)
+        first, last = (round(frame / take.units.time_stretch) for frame in frames)
+        take = replace(take, frames=range(first, min(last, first + MOST_FRAMES) + 1))
     shapes = [shape.key for shape in skin.shapes]
     known = [*skin.bones, *bones_of(mapping), *bones_of(shaped)]
-    reading = record(scene, armature, samples, known, units, shapes=shapes)
-    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    reading = record(take, armature, known, shapes=shapes)
+    recording = yield from jobs.counted(reading, "sample", len(take.frames), share=SHARE)
     bones = rest_bones(resolve(rig))
     weighing = skin_mass.slices(skin, bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
@@ -130,10 +129,9 @@ def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recogni
     body = yield from jobs.counted(read_body(scene, name), "sample", POSES, share=SHARE / 2)
     if body.is_rigid:
         return Recognised(RigMapping(method="skin"), body=body)
-    first, last = body_frames(scene, resolve(name))
-    samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record_body(scene, name, body, samples, units_about(scene, resolve(name)))
-    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    first, last = body_frames(timeline_of(scene), resolve(name))
+    take = Take.about(resolve(name), scene, range(first, min(last, first + MOST_FRAMES) + 1))
+    recording = yield from jobs.counted(record_body(take, name, body), "sample", len(take.frames), share=SHARE)
     weighing = skin_mass.slices(body.skin, body.bones, recording)
     mass = yield from jobs.meanwhile(read, weighing)
     seen = yield from jobs.meanwhile(read, shown_by_skin.slices(body.bones, body.skin, recording))

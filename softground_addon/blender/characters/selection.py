@@ -38,7 +38,7 @@ def chosen(
     known = {character.armature for character in scene.softground.characters}
     rigs = list(dict.fromkeys(skin_rig(scene.objects, rig) for obj in picked for rig in _rigs_of(obj, known)))
     if not rigs:
-        _check_no_crowd(scene.objects, scene.view_layers[0], picked)
+        _check_no_crowd(scene, picked)
     fresh = [rig for rig in rigs if rig not in known]
     props = [obj for obj in picked if obj.type == "MESH" and not _rigs_of(obj, known)]
     moving = [obj for obj in props if moves(obj)]
@@ -63,10 +63,10 @@ def is_body(obj: bpy.types.Object) -> bool:
     return any(moves(part) and not is_simulated(part) for part in parts_of(obj))
 
 
-def _check_no_crowd(objects: Objects, view_layer: bpy.types.ViewLayer, picked: Sequence[bpy.types.Object]) -> None:
+def _check_no_crowd(scene: bpy.types.Scene, picked: Sequence[bpy.types.Object]) -> None:
     """Raise InputError where an object shows figures that have no rig of their own."""
-    bodies = [obj for obj in objects if obj.type == "MESH" and obj not in picked and obj.find_armature()]
-    showing = instancers(objects, view_layer, bodies)
+    bodies = [obj for obj in scene.objects if obj.type == "MESH" and obj not in picked and obj.find_armature()]
+    showing = instancers(scene, bodies)
     for obj in picked:
         if obj.name in showing:
             raise InputError(crowd_finding([obj.name], showing[obj.name]).text)

@@ -20,7 +20,7 @@ from ...core.numerics.arrays import Array
 from ...core.numerics.orientation import quaternions, without_leaps
 from ..animation_layer.layer_curves import LayerCurve, assign_action, new_action
 from ..operator_base import reports_errors
-from ..settings import frame_rate_of, scene_of, units_of
+from ..settings import scene_of, timeline_of, units_of
 from ..translation import translated
 
 LARGEST = 2**29
@@ -148,7 +148,7 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         scene = scene_of(context)
-        rate = frame_rate_of(scene)
+        rate = timeline_of(scene).frame_rate
         first = scene.frame_start
 
         def frames(count: int, sampled: float) -> Any:

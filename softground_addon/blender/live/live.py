@@ -115,7 +115,7 @@ def begin(mode: LiveMode) -> None:
     state.live, state.live_ended = mode, ""
     session.current().is_live = True
     bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
-    if mode.current_scene():
+    if settings.scene_with(mode.scene):
         mode.follow()  # the frame may have changed meanwhile
     watch()
 
@@ -149,4 +149,4 @@ def discard() -> None:
 
 
 def _scene() -> bpy.types.Scene | None:
-    return state.live.current_scene() if state.live else None
+    return settings.scene_with(state.live.scene) if state.live else None

@@ -90,7 +90,7 @@ class LiveMode:
 
     def _listed(self) -> list[bpy.types.Object]:
         """The grounds of the scene."""
-        scene = self.current_scene()
+        scene = settings.scene_with(self.scene)
         return settings.listed_grounds(scene.softground) if scene else []
 
     def _objects(self) -> list[bpy.types.Object] | None:
@@ -232,17 +232,13 @@ class LiveMode:
         looks = replace(self._wanted.material, blur_sigma=asked.material.blur_sigma)
         return same_loads and _pressed_by(replace(self._wanted, material=looks)) == _pressed_by(asked)
 
-    def current_scene(self) -> bpy.types.Scene | None:
-        """The scene, which may be another one after an undo."""
-        return settings.scene_with(self.scene)
-
     def _here(self) -> bpy.types.Scene:
-        scene = self.current_scene()
+        scene = settings.scene_with(self.scene)
         assert scene is not None
         return scene
 
     def _frame(self) -> float:
-        scene = self.current_scene()
+        scene = settings.scene_with(self.scene)
         return float(scene.frame_current) if scene else -np.inf
 
     def in_contact(self) -> Contact:
@@ -340,7 +336,7 @@ class LiveMode:
         self._check_writable()
         for part in self._parts:
             part.discard()
-        if scene := self.current_scene():
+        if scene := settings.scene_with(self.scene):
             bake_report.note_prints(scene.softground)
 
     def _check_writable(self) -> None:

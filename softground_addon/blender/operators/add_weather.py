@@ -38,7 +38,7 @@ class SOFTGROUND_OT_add_weather(OnBake, Reading):
         is_new, preset = weather_result.modifier_of(ground) is None, "" if self.preset == NONE else self.preset
         yield from weather.adding(ground, preset=preset)
         if is_new and not preset:
-            weather_result.set_hours(self.scene, weather_result.NIGHT)
+            weather_result.set_hours(self.scene.softground, weather_result.NIGHT)
         return []
 
 

@@ -59,7 +59,9 @@ class SOFTGROUND_OT_live(ModalJob):
         return None
 
     def _changing(self) -> AbstractContextManager[None]:
-        return nullcontext() if state.live is None else analysis.own_changes(state.live.current_scene() or self.scene)
+        if state.live is None:
+            return nullcontext()
+        return analysis.own_changes(settings.scene_with(state.live.scene) or self.scene)
 
     def _show(self, result: live_mode.LiveMode | None) -> None:
         if result is not None:

@@ -70,11 +70,6 @@ class DepthPrediction:
     is_current: bool
 
 
-def of(scene: bpy.types.Scene) -> DepthPrediction | None:
-    """The prediction for a scene whose shot is known; to be shown; an outdated one is computed again soon."""
-    return look(scene)[1]
-
-
 def fineness(wanted: BakeSettings, predicted: DepthPrediction) -> Fineness:
     """Fineness of the bake to come, with what legs will carve at the depth to expect."""
     length = motion.shortest_sole([character.motion for character in predicted.analysis.loads])
@@ -87,7 +82,10 @@ def look_anew() -> None:
 
 
 def look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]:
-    """The settings of a scene as panels and overlay are drawn, and the prediction of `of`: looked at once in a turn."""
+    """The settings of a scene and the prediction if its shot is known, to be shown; looked at once in a turn.
+
+    An outdated prediction is computed again soon.
+    """
     if not bpy.app.timers.is_registered(look_anew):
         state.seen.clear()
         if not bpy.app.background:  # where there are no turns
@@ -114,18 +112,19 @@ def _prediction(known: analysis.Analysis | None, wanted: BakeSettings) -> DepthP
     return DepthPrediction(known, depth, is_current=True)
 
 
-def shown_cm(scene: bpy.types.Scene) -> float:
-    """The depth that was shown last for a scene [cm]; 0 before."""
-    return (state.shown_depths.get(scene.session_uid) or 0.0) * 100
+def shown_cm(options: Any) -> float:
+    """The depth that was shown last for the scene of some settings [cm]; 0 before."""
+    return (state.shown_depths.get(options.id_data.session_uid) or 0.0) * 100
 
 
-def type_cm(scene: bpy.types.Scene, depth: float) -> None:
+def type_cm(options: Any, depth: float) -> None:
     """Set the stiffness so that the typical print gets a depth [cm]; says why where none gives it.
 
     Scripts without a window may set it before the shot was read, which is done then.
     """
     if not depth > 0:
         return
+    scene = options.id_data
     try:
         wanted = settings.snapshot(scene)
         known = analysis.read(scene) if bpy.app.background else jobs.run(analysis.refreshing(wanted))
@@ -180,8 +179,7 @@ def _work_out() -> float | None:
     if live.is_answering():
         return SOON
     if not state.predicting:
-        for work in (_working_out_depth, settling):  # the last is done first
-            state.predicting.extend(work(wanted.scene.uid) for wanted in _shown())
+        state.predicting.extend(_working_out(wanted.scene.uid) for wanted in _shown())
     if not _is_done(state.predicting):
         return PAUSE
     if not state.aims and not bpy.app.timers.is_registered(_refine):
@@ -189,8 +187,9 @@ def _work_out() -> float | None:
     return PAUSE if state.aims else None
 
 
-def _working_out_depth(uid: int) -> jobs.Job[None]:
-    """Work the depth out in the scene of a session uid, with its settings as they are when it begins."""
+def _working_out(uid: int) -> jobs.Job[None]:
+    """Settle what was typed in the scene of a session uid, and work its depth out with the settings of then."""
+    yield from settling(uid)
     if scene := settings.scene_with(uid):
         yield from analysis.working_out_depth(settings.snapshot(scene))
 

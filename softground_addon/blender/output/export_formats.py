@@ -100,7 +100,7 @@ def _events(of: Callable[[], Callable[..., str | bytes]], *, is_timed: bool = Tr
 
     def writer(_ground: bpy.types.Object, options: Options) -> list[Path]:
         scene = settings.scene_of(bpy.context)
-        rate, bakes = settings.frame_rate_of(scene), bake_report.heard_bakes(scene.softground)
+        rate, bakes = settings.timeline_of(scene).frame_rate, bake_report.heard_bakes(scene.softground)
         table = events.between(event_points.events_of(bakes), options.start, options.end, rate)
         content = of()(table, frame_rate=rate) if is_timed else of()(table)
         with files.replacing(options.path) as partial:

@@ -112,7 +112,7 @@ def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames
         The empties, one per character.
     """
     empties: dict[str, bpy.types.Object] = {}
-    times = frames * settings.time_stretch_of(scene)
+    times = frames * settings.timeline_of(scene).stretch
     for (character, sole), values in forces_over_time(footprints, frames).items():
         if character not in empties:
             empties[character] = _fresh_empty(scene, f"{character} Forces")
@@ -218,7 +218,7 @@ class SOFTGROUND_OT_export_forces(OnBake, Act):
             self.report({"WARNING"}, why)
             estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
-        files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), estimates))
+        files.write_text(path, table(footprints, frames, settings.timeline_of(scene).frame_rate, estimates))
         self.say("Wrote {path}", path=path)
 
 

@@ -46,7 +46,7 @@ def write(
         If there is no bake or it has no events, the folder has no recordings or the file is one of them, there is no
         camera, or the file cannot be written.
     """
-    rate = settings.frame_rate_of(scene)
+    rate = settings.timeline_of(scene).frame_rate
     bakes = bake_report.heard_bakes(scene.softground)
     steps = [(step, bake.ground) for bake in bakes for step in _steps_of(bake, rate, start)]
     recordings = _recordings(samples, path) if samples else []

@@ -97,7 +97,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             _scale(layout, settings.scene_of(context).unit_settings.scale_length, character)
-            _on_the_spot(layout, prediction.of(settings.scene_of(context)), character)
+            _on_the_spot(layout, prediction.look(settings.scene_of(context))[1], character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
                 by_volume = mass == character.skin_mass

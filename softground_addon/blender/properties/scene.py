@@ -45,11 +45,11 @@ def _worked_out(name: str) -> dict[str, Any]:
 
     def shown(options: Any) -> float:
         hook = state.hooks.get(f"show_{name}")
-        return float(hook(options.id_data)) if hook else 0.0
+        return float(hook(options)) if hook else 0.0
 
     def set_to(options: Any, value: float) -> None:
         if hook := state.hooks.get(f"type_{name}"):
-            hook(options.id_data, value)
+            hook(options, value)
 
     return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
 

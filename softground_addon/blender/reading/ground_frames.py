@@ -14,13 +14,13 @@ from ...core.motion.ground_frame import GroundFrame, axes_of, rows, upright
 from ...core.motion.ground_ride import EVEN, GroundRide
 from ...core.numerics.arrays import Array
 from ...core.numerics.rigid import unit
-from ...core.rig.recording import SceneUnits
 from ...core.settings import BakeSettings
 from .. import jobs, settings
 from ..ground.still_ground import mover_of
 from ..placement import felt_gravity, still_frame, world_matrix
 from ..sampling.rig_recording import record_props
 from ..sampling.sampling_scene import object_named
+from ..sampling.take import Take
 
 STIFF = 1e-4
 """Largest change of a rigid ground's axes, relative to their length."""
@@ -58,14 +58,13 @@ def framed(wanted: BakeSettings) -> BakeSettings:
 def _moving(wanted: BakeSettings, up: Array) -> GroundFrame | None:
     """The frame of a ground with a mover; None where the ground stays where it is all the same."""
     assert wanted.ground
-    scene = settings.scene_named(wanted.scene)
     ground, scale = settings.resolve(wanted.ground), wanted.unit_scale_m
     name, frames = ground.name, range(wanted.frames[0], wanted.frames[1] + 1)
     from_origin = np.eye(4)
     from_origin[:3, 3] = world_matrix(ground)[:3, 3]
-    units = replace(wanted.units, frame=GroundFrame(rows(np.linalg.inv(from_origin))))
+    take = Take(wanted.scene, frames, replace(wanted.units, frame=GroundFrame(rows(np.linalg.inv(from_origin)))))
     beside = [*wanted.hard_grounds, *wanted.soft_grounds[1:]]
-    matrices, *of_others = jobs.run(_paths(scene, [ground, *map(settings.resolve, beside)], frames, units))
+    matrices, *of_others = jobs.run(_paths(take, [ground, *map(settings.resolve, beside)]))
     axes = axes_of(matrices)
     shape = np.swapaxes(axes, -1, -2) @ matrices[:, :3, :3]
     if np.ptp(shape, axis=0).max() > STIFF * np.abs(shape).max():
@@ -114,7 +113,7 @@ def _moving(wanted: BakeSettings, up: Array) -> GroundFrame | None:
     path = np.linalg.inv(in_units)
     place = path[0] @ matrices[0]
     frame = GroundFrame(rows(place), True, float(frames[0]), path, ride())
-    return replace(frame, riding=_riding(scene.objects, ground, place))
+    return replace(frame, riding=_riding(take.scene.objects, ground, place))
 
 
 def _lean(up: Array) -> Array:
@@ -122,14 +121,12 @@ def _lean(up: Array) -> Array:
     return np.degrees(np.arccos(np.clip(unit(up) @ upright(up.mean(axis=0))[2], -1.0, 1.0)))
 
 
-def _paths(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], frames: range, units: SceneUnits
-) -> jobs.Job[list[Array]]:
-    """Where some objects are at each frame in the frame of the units, (F, 4, 4) each [Blender units]."""
+def _paths(take: Take, objects: Sequence[bpy.types.Object]) -> jobs.Job[list[Array]]:
+    """Where some objects are at each frame, in the frame of its units, (F, 4, 4) each [Blender units]."""
     names, name = [obj.name_full for obj in objects], objects[0].name
-    reading = record_props(scene, name, frames, units, list(dict.fromkeys(names)))
-    recording = yield from jobs.counted(reading, "sample", len(frames))
-    metres = np.array([units.unit_scale_m] * 3 + [1.0])[:, None]
+    reading = record_props(take, name, list(dict.fromkeys(names)))
+    recording = yield from jobs.counted(reading, "sample", len(take.frames))
+    metres = np.array([take.units.unit_scale_m] * 3 + [1.0])[:, None]
     return [recording.props[name] / metres for name in names]
 
 

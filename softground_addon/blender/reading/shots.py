@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -14,7 +14,7 @@ from ...core.composers.relief_plan import IMAGE
 from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
 from ...core.findings import Finding
-from ...core.ground.hard_ground import HardOnSoft, soft_ground
+from ...core.ground.hard_ground import soft_ground
 from ...core.ground.heightfield import FlatTerrain, Terrain
 from ...core.ground.regions import MOST as MOST_KINDS
 from ...core.ground.regions import Regions
@@ -44,6 +44,7 @@ from ..sampling.body_sampling import sample_body
 from ..sampling.prop_extraction import check_props
 from ..sampling.rig_checks import check_rig
 from ..sampling.rig_sampling import RigPoses, sample_character, sample_prop
+from ..sampling.take import Take
 from ..weather import ground_weather as weather
 from . import ground_frames, hard_ground
 
@@ -183,17 +184,17 @@ def read_shot(wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Jo
     InputError
         If a character or the ground cannot be used; names it and the remedy.
     """
-    findings: list[Finding] = []
-    motions, rigs = yield from sample_characters(wanted, below, findings)
+    take, now, with_hard = _take(wanted, below), Progress("sample", 1.0), hard_ground.with_hard_objects.slices
+    motions, rigs = yield from sample_characters(wanted, take)
     lower, upper = extent(motions)
     if wanted.ground is None:
-        plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        layout = yield from meanwhile(Progress("sample", 1.0), created_ground.laid_out.slices(wanted, plan))
+        plan = yield from meanwhile(now, plan_ground.slices(motions))
+        layout = yield from meanwhile(now, created_ground.laid_out.slices(wanted, plan))
         plane = layout.plane if isinstance(plan.terrain, FlatTerrain) else plan.terrain
-        terrain, _, missing = yield from _with_hard(wanted, motions, [plane], np.stack([lower, upper]))
-        made = Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*findings, *missing), wanted.frame)
+        terrain, _, missing = yield from meanwhile(now, with_hard(wanted, motions, [plane], np.stack([lower, upper])))
+        made = Shot(tuple(motions), lower, upper, plan, None, terrain, rigs, (*take.findings, *missing), wanted.frame)
         return replace(made, layout=layout)
-    yield Progress("sample", 1.0)
+    yield now
     # What rests without a sole is seen on the ground too.
     skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
     places = np.concatenate([[lower, upper], *skins])
@@ -204,8 +205,10 @@ def read_shot(wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Jo
         surfaces.append(surface)
         soft.append(terrain)
         hard_parts += hard
-    terrain, apart, missing = yield from _with_hard(wanted, motions, soft, bounds, hard_parts)
-    shot = Shot(tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*findings, *missing), wanted.frame)
+    terrain, apart, missing = yield from meanwhile(now, with_hard(wanted, motions, soft, bounds, hard_parts))
+    shot = Shot(
+        tuple(motions), lower, upper, None, surfaces[0], terrain, rigs, (*take.findings, *missing), wanted.frame
+    )
     alone = replace(shot, motions=(), rigs=(), findings=())
     parts = [
         replace(alone, surface=surface, terrain=terrain, frame=of_ground.frame)
@@ -232,17 +235,6 @@ def _looked_at(wanted: BakeSettings, bounds: Array) -> Job[tuple[GroundSurface, 
     soft = yield from reused(now, "terrain", (surface, bounds), meanwhile(now, binning), of=name)
     hard_parts = yield from meanwhile(now, ground_surface.hard_part.slices(surface, bounds))
     return surface, soft, hard_parts
-
-
-def _with_hard(
-    wanted: BakeSettings,
-    motions: list[CharacterMotion],
-    grounds: Sequence[Terrain],
-    bounds: Array,
-    hard_parts: Sequence[MeshTerrain] = (),
-) -> Job[tuple[Terrain, list[HardOnSoft], list[Finding]]]:
-    work = hard_ground.with_hard_objects.slices(wanted, motions, grounds, bounds, hard_parts)
-    return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
@@ -273,53 +265,41 @@ def fit_ground(wanted: BakeSettings) -> Job[GroundPlan]:
     InputError
         If the characters cannot be read.
     """
-    motions, _ = yield from sample_characters(replace(wanted, response=None))
+    motions, _ = yield from sample_characters(replace(wanted, response=None), _take(wanted))
     return (yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions)))
 
 
-def sample_characters(
-    wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE, findings: list[Finding] | None = None
-) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
+def _take(wanted: BakeSettings, below: LayerKind = LayerKind.RESPONSE) -> Take:
+    """The frames of a bake, read below a layer."""
+    # What was read is compared later, and is not all settings.
+    return Take(wanted.scene, range(wanted.frames[0], wanted.frames[1] + 1), wanted.units, below)
+
+
+def sample_characters(wanted: BakeSettings, take: Take) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
-    scene, motions, rigs = settings.scene_named(wanted.scene), [], []
-    units = wanted.units  # what was read is compared later, and is not all settings
-    frames = range(wanted.frames[0], wanted.frames[1] + 1)
+    motions, rigs = [], []
     for number, character in enumerate(wanted.characters):
         mapping, poses = RigMapping(character.joints, character.soles, "settings"), None
         job: Generator[int | None, None, CharacterMotion]
         if character.armature:
             armature = settings.resolve(character.armature)
             if wanted.response:
-                check_rig(scene.objects, armature, mapping, character.mass_kg)
+                check_rig(take.scene.objects, armature, mapping, character.mass_kg)
                 with_all = mapping_with_legs(character)
                 legs = {joint: bone for joint, (bone, _) in with_all.joints.items() if joint not in mapping.joints}
-                controls = controls_of(scene.view_layers[0], armature, with_all)
+                controls = controls_of(take.scene.view_layers[0], armature, with_all)
                 poses = RigPoses([*(control.bone for control in controls), *legs.values()], with_skin=wanted.carves)
             extent = extent_of(wanted.unit_scale_m, armature)
             grown = extent / character.size_m if character.size_m else 1.0
-            job = sample_character(
-                scene,
-                armature,
-                mapping,
-                mass=character.mass_kg,
-                skin_mass=character.skin_mass_kg * grown**3,
-                frames=frames,
-                poses=poses,
-                below=below,
-                units=units,
-                findings=findings,
-            )
+            skin_mass = character.skin_mass_kg * grown**3
+            job = sample_character(take, armature, mapping, mass=character.mass_kg, skin_mass=skin_mass, poses=poses)
         elif character.body:
             mass, skin_mass = character.mass_kg, character.skin_mass_kg
-            job = sample_body(
-                scene, character.body, mapping, mass=mass, frames=frames, units=units, skin_mass=skin_mass
-            )
+            job = sample_body(take, character.body, mapping, mass=mass, skin_mass=skin_mass)
         else:
-            job = sample_prop(
-                scene, character.name, mapping, mass=character.mass_kg, frames=frames, units=units, findings=findings
-            )
-        motion = yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))
+            job = sample_prop(take, character.name, mapping, mass=character.mass_kg)
+        motion = yield from counted(job, "sample", len(take.frames), part=number, parts=len(wanted.characters))
         motions.append(replace(motion, ride=wanted.frame.ride) if wanted.frame else motion)
         if poses:
             ends = {joint: (poses.world @ poses.matrices[bone])[:, :3, 3] for joint, bone in legs.items()}

@@ -8,9 +8,9 @@ from typing import Any
 
 import bpy
 
+from ...core.rig.recording import Timeline
 from ..animation_layer.constraint_layer import is_response
 from ..compat import action_curves, slot_of
-from ..settings import time_stretch_of
 
 Range = tuple[float, float]
 
@@ -18,13 +18,13 @@ LEVEL = 1e-6
 """A curve that goes straight on by less than this in a frame stays where it is: rounding."""
 
 
-def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object, *, alone: bool = False) -> tuple[int, int] | None:
+def animated_frames(timeline: Timeline, obj: bpy.types.Object, *, alone: bool = False) -> tuple[int, int] | None:
     """First and last frame of the animation of an object, as `animated_range` has it."""
-    animated = animated_range(scene, obj, alone=alone)
+    animated = animated_range(timeline, obj, alone=alone)
     return animated and (floor(animated[0]), ceil(animated[1]))
 
 
-def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object, *, alone: bool = False) -> Range | None:
+def animated_range(timeline: Timeline, obj: bpy.types.Object, *, alone: bool = False) -> Range | None:
     """Times of the first key and the last of an object, and unless alone of those that it is parented to, in frames.
 
     Without any, of the leaders of its constraints. Curves that go on, by a modifier or by extrapolation, last as
@@ -36,15 +36,15 @@ def animated_range(scene: bpy.types.Scene, obj: bpy.types.Object, *, alone: bool
         return None
     starts, ends = zip(*ranges, strict=True)
     keyed = min(start for start in starts if start > -inf), max(end for end in ends if end < inf)
-    start, end = (frame * time_stretch_of(scene) for frame in (scene.frame_start, scene.frame_end))
+    start, end = timeline.start * timeline.stretch, timeline.end * timeline.stretch
     first = min(starts) if -inf not in starts else start if start < keyed[1] or inf in ends else keyed[0]
     last = max(ends) if inf not in ends else end if end > first else keyed[1]
     return first, last
 
 
-def held_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | None:
+def held_range(timeline: Timeline, obj: bpy.types.Object) -> Range | None:
     """The same, but infinite where strips hold no pose beyond it: the rig is at rest there."""
-    animated = animated_range(scene, obj)
+    animated = animated_range(timeline, obj)
     if animated is None:
         return None
     datas = [node.animation_data for node in (obj, *ancestors(obj)) if node.animation_data]
@@ -55,13 +55,13 @@ def held_range(scene: bpy.types.Scene, obj: bpy.types.Object) -> Range | None:
     return -inf if opens else first, inf if closes else last
 
 
-def frames_with_shapes(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[int, int]:
+def frames_with_shapes(timeline: Timeline, objects: Iterable[bpy.types.Object]) -> tuple[int, int]:
     """First and last frame of the scene in which objects or their shape keys are animated; all of it without keys."""
-    ranges = [each for obj in objects for each in (animated_frames(scene, obj), _of_shape_keys(obj)) if each]
+    ranges = [each for obj in objects for each in (animated_frames(timeline, obj), _of_shape_keys(obj)) if each]
     if not ranges:
-        return scene.frame_start, scene.frame_end
-    stretch = time_stretch_of(scene)
-    return floor(min(first for first, _ in ranges) / stretch), ceil(max(last for _, last in ranges) / stretch)
+        return timeline.start, timeline.end
+    first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
+    return floor(first / timeline.stretch), ceil(last / timeline.stretch)
 
 
 def _of_shape_keys(obj: bpy.types.Object) -> Range | None:

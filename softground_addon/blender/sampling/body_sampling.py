@@ -16,17 +16,18 @@ from ...core.motion.ground_frame import GroundFrame
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.bare_body import BareBody, bare_body, body_motion, recorded
 from ...core.rig.mapping import RigMapping
-from ...core.rig.recording import Recording, SceneUnits
+from ...core.rig.recording import Recording, Timeline
 from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..placement import units_about, world_matrix
 from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries
 from ..rigs.rig_mapping import parts_of
-from ..settings import resolve
+from ..settings import resolve, timeline_of
 from .rig_checks import check_frames, check_mass
 from .sampling_scene import depsgraph_at, object_named, sampling_scene
 from .skin_sampling import mesh_of
+from .take import Take
 
 POSES = 24
 """Poses of the whole animation by which parts that move together are found, whatever frames are baked."""
@@ -51,9 +52,9 @@ def deforms(obj: bpy.types.Object) -> bool:
     return bool(keys and keys.animation_data) or any(m.type in _CACHES and m.show_viewport for m in obj.modifiers)
 
 
-def body_frames(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[int, int]:
+def body_frames(timeline: Timeline, body: bpy.types.Object) -> tuple[int, int]:
     """First and last frame of the scene in which a body is animated; all of it for caches."""
-    return frames_with_shapes(scene, [body, *meshes_of(body)])
+    return frames_with_shapes(timeline, [body, *meshes_of(body)])
 
 
 def read_body(
@@ -78,7 +79,7 @@ def read_body(
         check_libraries(mesh)
         if mesh.mode == "EDIT":
             raise InputError(f"'{mesh.name}', which prints, is in Edit Mode: leave it with Tab first.")
-    first, last = body_frames(scene, body)
+    first, last = body_frames(timeline_of(scene), body)
     poses = np.unique(np.linspace(first, last, POSES).round().astype(int)).tolist()
     objects = [mesh.name_full for mesh in meshes_of(body)]
     positions, counts, triangles = yield from _positions(scene, objects, poses, None, units_about(scene, body).frame)
@@ -87,26 +88,17 @@ def read_body(
     return (yield from bare_body.slices(positions, triangles, list(zip(objects, counts, strict=True)), known))
 
 
-def record_body(
-    scene: bpy.types.Scene, name: ObjectName, body: BareBody, frames: range, units: SceneUnits
-) -> Generator[int, None, Recording]:
+def record_body(take: Take, name: ObjectName, body: BareBody) -> Generator[int, None, Recording]:
     """Poses of the parts of a body over time; yields the number of frames read, and raises as `read_body` does."""
     objects = [mesh.name_full for mesh in meshes_of(resolve(name))]
-    positions, counts, _ = yield from _positions(scene, objects, frames, body.followed, units.frame)
+    positions, counts, _ = yield from _positions(take.scene, objects, take.frames, body.followed, take.units.frame)
     if sum(counts) != len(body.skin.vertices):
         raise InputError(f"The meshes of '{name.name}' were changed while they were read: try again.")
-    return recorded(body, positions, frames, units)
+    return recorded(body, positions, take.frames, take.units)
 
 
 def sample_body(
-    scene: bpy.types.Scene,
-    name: ObjectName,
-    mapping: RigMapping,
-    *,
-    mass: float,
-    frames: range,
-    units: SceneUnits,
-    skin_mass: float = 0.0,
+    take: Take, name: ObjectName, mapping: RigMapping, *, mass: float, skin_mass: float = 0.0
 ) -> Generator[int | None, None, CharacterMotion]:
     """Read a body without an armature frame by frame.
 
@@ -116,13 +108,13 @@ def sample_body(
         As for `read_body`.
     mapping : RigMapping
         Its soles are on parts.
-    scene, mass, frames, units, skin_mass
+    take, mass, skin_mass
         As for `rig_sampling.sample_character`; and so is what it yields, returns and raises.
     """
     check_mass(name.name, mass)
-    check_frames(frames)
+    check_frames(take.frames)
     bones = [bone for source in mapping.soles for bone in (source.bone, source.toe_bone, *source.parts)]
-    body = yield from read_body(scene, name, bones)
+    body = yield from read_body(take.scene, name, bones)
     for source in mapping.soles:
         missing = [bone for bone in (source.bone, source.toe_bone) if bone and bone not in body.bones]
         if source.object or missing:
@@ -131,7 +123,7 @@ def sample_body(
                 f"Contact '{source.name}' of '{name.name}' has no {what} that moves with it: remove the contact, or "
                 "remove the character and press Add Character again."
             )
-    recording = yield from record_body(scene, name, body, frames, units)
+    recording = yield from record_body(take, name, body)
     return (yield from body_motion(name.name, body, mapping, recording, mass=mass, skin_mass=skin_mass))
 
 

@@ -11,27 +11,23 @@ import bpy
 from ...core.findings import Finding, listed
 from ..compat import node_inputs
 from ..nodes.node_modifiers import named_by_nodes
-from ..settings import Objects
 
 MOST_LOOKED_AT = 100_000
 """Instances that are looked at (0.3 s)."""
 
 
-def instancers(
-    objects: Objects, view_layer: bpy.types.ViewLayer, shown: Collection[bpy.types.Object]
-) -> dict[str, str]:
-    """Names of the objects of a scene that show instances of some objects or of their meshes, each with the name of
-    that object.
+def instancers(scene: bpy.types.Scene, shown: Collection[bpy.types.Object]) -> dict[str, str]:
+    """Names of the objects that show instances of some objects or of their meshes, each with the name of that object.
 
     Copies whose instances a modifier has realized are not among them.
     """
     of_groups: dict[Any, list[Any]] = {}  # which thousands of objects may share
-    waiting = {obj.name for obj in objects if not _drawn_on(obj, of_groups).isdisjoint(shown)}
+    waiting = {obj.name for obj in scene.objects if not _drawn_on(obj, of_groups).isdisjoint(shown)}
     if not waiting:
         return {}
     names, showing = {obj.data.name_full: obj.name for obj in shown}, {}
-    view_layer.update()
-    depsgraph = view_layer.depsgraph
+    scene.view_layers[0].update()
+    depsgraph = scene.view_layers[0].depsgraph
     for instance in islice(depsgraph.object_instances if depsgraph else (), MOST_LOOKED_AT):
         if not (instance.is_instance and instance.parent.name in waiting):
             continue

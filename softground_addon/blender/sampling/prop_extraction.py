@@ -14,6 +14,7 @@ from ...core.soles.prop_motion import prop_motion
 from .. import mesh_arrays
 from ..rigs.libraries import check_libraries
 from ..settings import Objects
+from .sampling_scene import object_named
 
 
 def check_props(
@@ -76,8 +77,8 @@ def surface_of(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> tuple[
     return vertices.astype(float), triangles
 
 
-def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
-    """An object of the scene that prints with its own mesh, and its volume [m³]: its `prop_motion`.
+def read_prop(view_layer: bpy.types.ViewLayer, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
+    """An object that prints with its own mesh, and its volume [m³]: its `prop_motion`.
 
     Parameters
     ----------
@@ -91,6 +92,6 @@ def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tu
     InputError
         If its mesh has no faces, or its scale is 0 or changes.
     """
-    obj = next(obj for obj in scene.objects if obj.name_full == source.object)
-    vertices, triangles = surface_of(scene.view_layers[0], obj)
+    obj = object_named(source.object)
+    vertices, triangles = surface_of(view_layer, obj)
     return prop_motion(vertices, triangles, matrices, owner=obj.name, name=source.name, side=source.side)

@@ -11,28 +11,24 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.findings import Finding
-from ...core.rig.recording import Recording, SceneUnits
-from ..animation_layer.constraint_layer import LayerKind, without_layers
+from ...core.rig.recording import Recording
+from ..animation_layer.constraint_layer import without_layers
 from ..placement import world_matrix
 from ..rigs.frame_ranges import held_range
+from ..settings import timeline_of
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .rig_checks import check_finite
 from .sampling_scene import depsgraph_at, object_named, sampling_scene, still_there, user_scene
+from .take import Take
 
 
 def record(
-    scene: bpy.types.Scene,
+    take: Take,
     armature: bpy.types.Object,
-    frames: range,
     bones: Iterable[str],
-    units: SceneUnits,
     props: Sequence[str] = (),
     shapes: Sequence[tuple[str, str]] = (),
-    *,
-    below: LayerKind = LayerKind.RESPONSE,
-    findings: list[Finding] | None = None,
 ) -> Generator[int, None, Recording]:
     """Transforms over time of bones and objects, and values of shape keys.
 
@@ -41,56 +37,48 @@ def record(
     Raises InputError, with the frame, where that is no place.
     """
     names, rig, full_name = list(dict.fromkeys(bones)), armature.name, armature.name_full
-    handled = yield from _moved_by_handlers(scene, full_name, frames, names, props)
-    with without_layers(object_named(full_name), below):
+    handled = yield from _moved_by_handlers(take, full_name, names, props)
+    with without_layers(object_named(full_name), take.below):
         keyed = not (props or shapes or handled) and is_moved_by_keys_alone(object_named(full_name), names)
     if keyed:
-        recording = yield from _read_keys(full_name, frames, names, units, below)
+        recording = yield from _read_keys(take, full_name, names)
     else:
-        recording = yield from _evaluate(scene, full_name, frames, names, units, props, shapes, below, handled=handled)
-    animated = None if handled else held_range(scene, object_named(full_name))
+        recording = yield from _evaluate(take, full_name, names, props, shapes, handled=handled)
+    animated = None if handled else held_range(timeline_of(take.scene), object_named(full_name))
     if animated:
-        recording = replace(recording, animated=(animated[0] / units.time_stretch, animated[1] / units.time_stretch))
-    return _checked(rig, recording, findings if handled else None)
+        stretch = take.units.time_stretch
+        recording = replace(recording, animated=(animated[0] / stretch, animated[1] / stretch))
+    return _checked(take, rig, recording, handled=handled)
 
 
-def record_props(
-    scene: bpy.types.Scene,
-    name: str,
-    frames: range,
-    units: SceneUnits,
-    props: Sequence[str],
-    *,
-    findings: list[Finding] | None = None,
-) -> Generator[int, None, Recording]:
+def record_props(take: Take, name: str, props: Sequence[str]) -> Generator[int, None, Recording]:
     """Transforms of objects over time; `name` is their common name in errors.
 
     Yields the number of frames read.
 
     Raises InputError, with the frame, where that is no place.
     """
-    handled = yield from _moved_by_handlers(scene, "", frames, [], props)
-    recording = yield from _evaluate(scene, "", frames, [], units, props, handled=handled)
-    return _checked(name, recording, findings if handled else None)
+    handled = yield from _moved_by_handlers(take, "", [], props)
+    recording = yield from _evaluate(take, "", [], props, handled=handled)
+    return _checked(take, name, recording, handled=handled)
 
 
-def _checked(name: str, recording: Recording, findings: list[Finding] | None) -> Recording:
-    """The recording, which must be finite; `findings` take that handlers of others moved it."""
-    if findings is not None:
-        findings.append(handled_finding(name))
+def _checked(take: Take, name: str, recording: Recording, *, handled: bool) -> Recording:
+    """The recording, which must be finite; the findings take that handlers of others moved it."""
+    if handled:
+        take.findings.append(handled_finding(name))
     recording = recording.in_frame()
     check_finite(name, recording)
     return recording
 
 
-def _read_keys(
-    armature: str, frames: range, bones: Sequence[str], units: SceneUnits, below: LayerKind
-) -> Generator[int, None, Recording]:
+def _read_keys(take: Take, armature: str, bones: Sequence[str]) -> Generator[int, None, Recording]:
     """Record the matrices of a rig that nothing but its keys moves, bone by bone.
 
     Yields the frames that come to as much work.
     """
-    times = np.array(frames) * units.time_stretch
+    frames, below = take.frames, take.below
+    times = np.array(frames) * take.units.time_stretch
     chain = with_parents(object_named(armature), bones)
     poses = np.empty((len(frames), len(chain), 4, 4), dtype=np.float32)
     for done, name in enumerate(chain):
@@ -109,19 +97,16 @@ def _read_keys(
         poses=poses,
         world=world,
         props={},
-        units=units,
+        units=take.units,
     )
 
 
 def _evaluate(
-    scene: bpy.types.Scene,
+    take: Take,
     armature: str,
-    frames: range,
     bones: Sequence[str],
-    units: SceneUnits,
     props: Sequence[str],
     shapes: Sequence[tuple[str, str]] = (),
-    below: LayerKind = LayerKind.RESPONSE,
     *,
     handled: bool,
 ) -> Generator[int, None, Recording]:
@@ -129,6 +114,7 @@ def _evaluate(
 
     `handled` lets frame handlers of others act.
     """
+    scene, frames, units = take.scene, take.frames, take.units
     placed = world_matrix if units.frame else attrgetter("matrix_world")
     poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
     prop_matrices = np.empty((len(frames), len(props), 4, 4))
@@ -143,7 +129,7 @@ def _evaluate(
         for done, frame in enumerate(frames):
             if handled:
                 let_handlers_act(still_there(name), frame)
-            with without_layers(object_named(armature), below) if armature else nullcontext():
+            with without_layers(object_named(armature), take.below) if armature else nullcontext():
                 depsgraph = depsgraph_at(name, frame)
                 if armature:
                     evaluated = object_named(armature).evaluated_get(depsgraph)
@@ -185,13 +171,13 @@ def is_simulated(obj: bpy.types.Object) -> bool:
 
 
 def _moved_by_handlers(
-    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], props: Sequence[str]
+    take: Take, armature: str, bones: Sequence[str], props: Sequence[str]
 ) -> Generator[int, None, bool]:
     """True if frame handlers of others move a rig or objects, from a few frames with them and without."""
     if not moving_handlers() or any(is_simulated(object_named(obj)) for obj in props):
         return False
-    objects = [*([armature] if armature else []), *props]
-    with sampling_scene(scene, armature, bones, props, handled=True) as name:
+    objects, frames = [*([armature] if armature else []), *props], take.frames
+    with sampling_scene(take.scene, armature, bones, props, handled=True) as name:
         for frame in dict.fromkeys((frames[0], frames[len(frames) // 3], frames[-1])):
             seen: list[Any] = []
             for handled in (False, True):

@@ -13,20 +13,17 @@ import bpy
 import numpy as np
 
 from ...core.carving.responded_skin import WornSkin
-from ...core.findings import Finding
 from ...core.motion.motion import CharacterMotion
 from ...core.motion.sole_motion import SoleMotion
 from ...core.numerics.arrays import Array
 from ...core.rig.bones import RigBones
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.motion_assembly import assemble_motion
-from ...core.rig.recording import Recording, SceneUnits
+from ...core.rig.recording import Recording
 from ...core.rig.rig_skin import RigSkin
 from ...core.rig.skin_stances import skin_stances
 from ...core.skin.skin_motion import MOST_SAMPLES
-from ..animation_layer.constraint_layer import LayerKind
 from ..jobs import meanwhile
-from ..placement import units_about
 from ..reuse import reused
 from ..rigs.rig_mapping import rest_bones
 from ..settings import name_of, resolve
@@ -34,6 +31,7 @@ from .prop_extraction import check_props, read_prop
 from .rig_checks import check_frames, check_mass, check_recording, check_rig
 from .rig_recording import record, record_props
 from .skin_sampling import meshes_on, read_skin
+from .take import Take
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -67,42 +65,30 @@ class RigPoses:
 
 
 def sample_character(
-    scene: bpy.types.Scene,
+    take: Take,
     armature: bpy.types.Object,
     mapping: RigMapping,
     *,
     mass: float,
-    frames: range,
     poses: RigPoses | None = None,
-    units: SceneUnits | None = None,
     skin_mass: float = 0.0,
-    below: LayerKind = LayerKind.RESPONSE,
-    findings: list[Finding] | None = None,
 ) -> Sampling:
     """Read a character frame by frame.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-        The user's scene: its meshes; only read.
+    take : Take
+        With the units of the bake that it is read for, or about itself.
     armature : bpy.types.Object
         May be linked or overridden.
     mapping : RigMapping
         From `rig_mapping.map_rig`, corrected by the user or not.
     mass : float
         [kg]
-    frames : range
-        Scene frames.
     poses : RigPoses, optional
         Gets the poses of its bones.
-    units : SceneUnits, optional
-        Those of the bake that it is read for; as they are now in the scene where it is read for itself.
     skin_mass : float
         That the volume of its skin suggests [kg], against which a bake is checked; 0 where unknown.
-    below : LayerKind
-        Lowest of the add-on's layers that is not read.
-    findings : list of Finding, optional
-        Takes what the user should know of how it was read.
 
     Yields
     ------
@@ -118,28 +104,28 @@ def sample_character(
     InputError
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
-    check_rig(scene.objects, armature, mapping, mass)
-    check_frames(frames)
+    objects = take.scene.objects
+    check_rig(objects, armature, mapping, mass)
+    check_frames(take.frames)
     bones = [*bones_of(mapping), *(poses.bones if poses else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
-    if on_bones and meshes_on(scene.objects, armature):
-        skin = yield from meanwhile(0, read_skin.slices(scene.objects, armature))
-        armature = resolve(rig)
-    units = units or units_about(scene, armature)
-    bones += skin.bones if skin and len(frames) <= MOST_SAMPLES else ()
+    if on_bones and meshes_on(objects, armature):
+        skin = yield from meanwhile(0, read_skin.slices(objects, armature))
+    bones += skin.bones if skin and len(take.frames) <= MOST_SAMPLES else ()
     shapes = [shape.key for shape in skin.shapes] if skin else []
-    recording = yield from record(scene, armature, frames, bones, units, props, shapes, below=below, findings=findings)
+    recording = yield from record(take, resolve(rig), bones, props, shapes)
     if poses:
         poses.take(recording)
         if poses.with_skin and skin and {*skin.bones} <= {*recording.bones}:
             poses.skin = WornSkin(rig.name, skin, rest_bones(resolve(rig)), mapping, recording)
-    return (yield from recorded_motion(scene, resolve(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
+    layer = take.scene.view_layers[0]
+    return (yield from recorded_motion(layer, resolve(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
 
 
 def recorded_motion(
-    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
     armature: bpy.types.Object,
     mapping: RigMapping,
     recording: Recording,
@@ -152,15 +138,17 @@ def recorded_motion(
 
     Parameters
     ----------
+    view_layer : bpy.types.ViewLayer
+        In which the objects that it carries are evaluated.
     recording : Recording
         Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `MOST_SAMPLES` samples.
-    scene, armature, mapping, mass, skin_mass
+    armature, mapping, mass, skin_mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """
     check_recording(armature.name, recording)
     name, bones = armature.name, rest_bones(armature)
     carried = {
-        source.name: read_prop(scene, source, recording.props[source.object])[0]
+        source.name: read_prop(view_layer, source, recording.props[source.object])[0]
         for source in mapping.soles
         if source.object
     }
@@ -187,16 +175,7 @@ def _motion(
     return (yield from assembling)
 
 
-def sample_prop(
-    scene: bpy.types.Scene,
-    name: str,
-    mapping: RigMapping,
-    *,
-    mass: float,
-    frames: range,
-    units: SceneUnits,
-    findings: list[Finding] | None = None,
-) -> Sampling:
+def sample_prop(take: Take, name: str, mapping: RigMapping, *, mass: float) -> Sampling:
     """Read frame by frame a prop without a rig: one or more objects that fall, roll or slide together.
 
     Parameters
@@ -205,16 +184,17 @@ def sample_prop(
         What the user calls it.
     mapping : RigMapping
         Its soles are objects.
-    scene, mass, frames, units, findings
+    take, mass
         As for `sample_character`; and so is what it yields, returns and raises.
     """
     check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
-    check_props(scene.objects, name, sources)
-    check_frames(frames)
+    check_props(take.scene.objects, name, sources)
+    check_frames(take.frames)
     props = list(dict.fromkeys(source.object for source in sources))
-    recording = yield from record_props(scene, name, frames, units, props, findings=findings)
-    parts = [read_prop(scene, source, recording.props[source.object]) for source in sources]
+    recording = yield from record_props(take, name, props)
+    view_layer = take.scene.view_layers[0]
+    parts = [read_prop(view_layer, source, recording.props[source.object]) for source in sources]
     volumes = np.array([volume for _, volume in parts])
     shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
     motions = tuple(motion for motion, _ in parts)
@@ -223,8 +203,8 @@ def sample_prop(
         mass=mass,
         leg_length=max(motion.sole.prop.size for motion in motions if motion.sole.prop),
         frames=recording.frames,
-        frame_rate=units.frame_rate,
+        frame_rate=take.units.frame_rate,
         soles=motions,
-        gravity=units.gravity_m_s2,
+        gravity=take.units.gravity_m_s2,
         centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
     )

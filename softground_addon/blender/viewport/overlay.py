@@ -60,7 +60,7 @@ def draw_shapes() -> None:
     context: Any = bpy.context
     if not panel.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
         return
-    predicted = prediction.of(settings.scene_of(context))
+    _, predicted = prediction.look(settings.scene_of(context))
     if predicted is None:
         return
     known = predicted.analysis
@@ -126,7 +126,7 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if not (panel.show_overlay and panel.show_footfalls) or not context.space_data.overlay.show_overlays:
         return
-    predicted = prediction.of(settings.scene_of(context))
+    _, predicted = prediction.look(settings.scene_of(context))
     if predicted is None:
         return
     known = predicted.analysis

@@ -25,32 +25,32 @@ def modifier_of(ground: bpy.types.Object | None) -> Any:
     return modifier if modifier and modifier.node_group and weather_nodes.within(modifier.node_group) else None
 
 
-def hours(scene: bpy.types.Scene) -> float:
+def hours(options: Any) -> float:
     """Length of the scene in the time of its weather, whose scale is not keyed [h]."""
-    modifier = modifier_of(scene.softground.ground)
+    modifier = modifier_of(options.ground)
     if not modifier:
         return 0.0
-    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(*_span(scene, modifier)) / weather.HOUR
+    return weather_keys.values_of(modifier)["Time Scale"] * _seconds(*_span(options, modifier)) / weather.HOUR
 
 
-def set_hours(scene: bpy.types.Scene, wanted: float) -> None:
+def set_hours(options: Any, wanted: float) -> None:
     """Have the scene last so long [h]; as much snow lies at its end as before."""
-    if modifier := modifier_of(scene.softground.ground):
-        depth = snow_cm(scene)
-        _write(modifier, "Time Scale", wanted * weather.HOUR / _seconds(*_span(scene, modifier)))
-        set_snow_cm(scene, depth)
+    if modifier := modifier_of(options.ground):
+        depth = snow_cm(options)
+        _write(modifier, "Time Scale", wanted * weather.HOUR / _seconds(*_span(options, modifier)))
+        set_snow_cm(options, depth)
 
 
-def snow_cm(scene: bpy.types.Scene) -> float:
+def snow_cm(options: Any) -> float:
     """Depth of the new snow on open ground at the end of the scene [cm]."""
-    modifier = modifier_of(scene.softground.ground)
-    return _cover_cm(modifier, scene.softground.material.surface, *_span(scene, modifier))() if modifier else 0.0
+    modifier = modifier_of(options.ground)
+    return _cover_cm(modifier, options.material.surface, *_span(options, modifier))() if modifier else 0.0
 
 
-def set_snow_cm(scene: bpy.types.Scene, wanted: float) -> None:
+def set_snow_cm(options: Any, wanted: float) -> None:
     """Let so much snow fall that it lies that deep at the end [cm], or the most that can fall."""
-    if modifier := modifier_of(scene.softground.ground):
-        cover = _cover_cm(modifier, scene.softground.material.surface, *_span(scene, modifier))
+    if modifier := modifier_of(options.ground):
+        cover = _cover_cm(modifier, options.material.surface, *_span(options, modifier))
         least, most = 0.0, MOST_SNOW if wanted > 0 else 0.0
         for _ in range(ROUNDS if most else 0):
             middle = (least + most) / 2
@@ -72,12 +72,12 @@ def _cover_cm(modifier: Any, surface: str, span: weather.Span, end: float) -> Ca
     return cover
 
 
-def _span(scene: bpy.types.Scene, modifier: Any) -> tuple[weather.Span, float]:
-    """The span of the weather, and the scene's last frame, both in the time that playback counts."""
-    tree, stretch = modifier.node_group, settings.time_stretch_of(scene)
+def _span(options: Any, modifier: Any) -> tuple[weather.Span, float]:
+    """The span of the weather, and the last frame of the scene, both in the time that playback counts."""
+    tree, timeline = modifier.node_group, settings.timeline_of(options.id_data)
     first = weather_nodes.within(tree).nodes[weather_course_nodes.FIRST].outputs[0].default_value
-    end = float(max(scene.frame_end * stretch, first + 1.0))
-    return weather.span_of(first, max(end, tree[weather_keys.LAST]), settings.frame_rate_of(scene) * stretch), end
+    end = float(max(timeline.end * timeline.stretch, first + 1.0))
+    return weather.span_of(first, max(end, tree[weather_keys.LAST]), timeline.frame_rate * timeline.stretch), end
 
 
 def _seconds(span: weather.Span, end: float) -> float:

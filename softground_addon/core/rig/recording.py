@@ -42,6 +42,20 @@ class SceneUnits:
 
 
 @dataclass(frozen=True)
+class Timeline:
+    """First and last frame of a scene, frames per second [Hz], and frames of the animation per frame of the scene.
+
+    The last is 1 unless time is remapped: keys, strips, nodes and caches count the animation's frames; the timeline,
+    and with it a bake, the scene's.
+    """
+
+    start: int
+    end: int
+    frame_rate: float
+    stretch: float
+
+
+@dataclass(frozen=True)
 class Recording:
     """Poses of bones and objects over time, as evaluated; a bone's y axis points from head to tail.
 

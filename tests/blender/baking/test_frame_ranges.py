@@ -7,6 +7,7 @@ import pytest
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.panels.panels import _apart_from_scene
 from softground_addon.blender.rigs.frame_ranges import animated_frames, held_range
+from softground_addon.blender.settings import timeline_of
 from tests.blender import shots
 from tests.blender.grounds import bake
 from tests.blender.interface.test_selection import controlled
@@ -32,7 +33,7 @@ def loop(armature, count=0, before="NONE", after="REPEAT_OFFSET"):
 
 def frames(scene, armature):
     bpy.context.view_layer.update()
-    return animated_frames(scene, armature)
+    return animated_frames(timeline_of(scene), armature)
 
 
 def test_keys_alone_last_from_the_first_to_the_last(scene, walker):
@@ -179,5 +180,5 @@ def test_poses_are_held_beyond_a_strip_only_as_it_says(scene, walker, extrapolat
     data.action = None
     strip.frame_start, strip.frame_end = 1.5, 48.5
     strip.extrapolation = extrapolation
-    assert held_range(scene, walker) == held
+    assert held_range(timeline_of(scene), walker) == held
     assert frames(scene, walker) == (1, 49)

@@ -13,7 +13,8 @@ from softground_addon.blender.rigs.carried import carrier_of
 from softground_addon.blender.rigs.rig_mapping import rest_bones
 from softground_addon.blender.sampling.rig_recording import record
 from softground_addon.blender.sampling.skin_sampling import read_skin
-from softground_addon.blender.settings import character_of, units_of
+from softground_addon.blender.sampling.take import Take
+from softground_addon.blender.settings import character_of
 from softground_addon.core.rig.rig_skin import of_body
 from tests.blender import rigs
 
@@ -142,7 +143,7 @@ def test_a_robot_of_rigid_parts_is_its_body_though_its_hands_are_deformed(scene)
         obj.parent_type, obj.parent_bone = "BONE", bone.name
         obj.matrix_parent_inverse = (bone.matrix_local @ Matrix.Translation((0, bone.length, 0))).inverted()
     skin = read_skin(scene.objects, armature)
-    recording = run_reading(record(scene, armature, range(1, 3), skin.bones, units_of(scene)))
+    recording = run_reading(record(Take.about(armature, scene, range(1, 3)), armature, skin.bones))
     assert of_body(skin, rest_bones(armature), recording).all()
 
 

@@ -16,6 +16,7 @@ from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.recognition import recognise
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from tests.blender import grounds, rigs
 from tests.blender.responders import mapping_of
 
@@ -76,13 +77,9 @@ def test_feet_that_nothing_names_are_found_by_their_skin(scene):
 def test_the_ground_is_where_the_skin_rests_and_each_foot_bears_as_it_stands(scene):
     armature = stool()
     character = add_character(scene, armature)
-    motion = jobs.run(
-        jobs.counted(
-            sample_character(scene, armature, mapping_of(character), mass=10.0, frames=range(1, FRAMES + 1)),
-            "sample",
-            FRAMES,
-        )
-    )
+    take = Take.about(armature, scene, range(1, FRAMES + 1))
+    reading = sample_character(take, armature, mapping_of(character), mass=10.0)
+    motion = jobs.run(jobs.counted(reading, "sample", FRAMES))
     assert motion.ground_level == pytest.approx(0.06, abs=1e-3)
     for sole in motion.soles:
         number = list(LEGS).index(sole.sole.name)
@@ -208,7 +205,8 @@ def test_a_limb_lies_where_its_skin_does_though_other_bones_bend_it(scene):
     character = add_character(scene, armature)
     (sole,) = character.soles
     sole.kind = "LIMB"
-    reading = sample_character(scene, armature, mapping_of(character), mass=10.0, frames=range(1, FRAMES + 1))
+    take = Take.about(armature, scene, range(1, FRAMES + 1))
+    reading = sample_character(take, armature, mapping_of(character), mass=10.0)
     motion = jobs.run(jobs.counted(reading, "sample", FRAMES))
     (limb,) = motion.soles
     assert motion.ground_level == pytest.approx(0.75 - 0.6 * 0.4 - 0.4 * 0.9, abs=2e-3)

@@ -10,6 +10,7 @@ import pytest
 from softground_addon.blender.jobs import run
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from softground_addon.core.errors import InputError
 from softground_addon.core.rig.mapping import RigMapping, SoleSource
 from tests.blender import fingerprints, rigs, shots
@@ -20,7 +21,7 @@ BLENDER = rigs.FAMILIES["blender"]
 
 def sample(scene, armature, mapping=None, *, end=20, step=1):
     mapping = mapping or map_rig(armature)
-    return run(sample_character(scene, armature, mapping, mass=70.0, frames=range(1, end + 1, step)))
+    return run(sample_character(Take.about(armature, scene, range(1, end + 1, step)), armature, mapping, mass=70.0))
 
 
 def moving_human(**options):
@@ -161,7 +162,7 @@ def test_sampling_leaves_the_file_as_it_was(scene, action, reading):
     bpy.app.handlers.frame_change_post.append(on_frame)
     try:
         before = state(scene, armature)
-        sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 31))
+        sampling = sample_character(Take.about(armature, scene, range(1, 31)), armature, map_rig(armature), mass=70.0)
         next(sampling)
         if action == "finish":
             for _ in sampling:
@@ -232,7 +233,7 @@ def state(scene, armature):
 def test_evaluating_takes_one_step_per_frame(scene):
     armature = moving_human()
     let_blender_evaluate(armature)
-    sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 10))
+    sampling = sample_character(Take.about(armature, scene, range(1, 10)), armature, map_rig(armature), mass=70.0)
     steps = list(sampling)
     assert steps[:9] == list(range(1, 10))
     assert set(steps[9:]) <= {9}  # the soles are read in steps of their own
@@ -240,7 +241,7 @@ def test_evaluating_takes_one_step_per_frame(scene):
 
 def test_reading_keys_takes_one_step_for_each_bone(scene):
     armature = moving_human()
-    sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 101))
+    sampling = sample_character(Take.about(armature, scene, range(1, 101)), armature, map_rig(armature), mass=70.0)
     steps = list(sampling)
     assert steps == sorted(steps)
     assert len(set(steps)) > 10
@@ -424,9 +425,9 @@ def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, mes
 def test_settings_that_cannot_be_used_are_refused(scene, change, message):
     armature = moving_human()
     settings = {"mapping": map_rig(armature), "mass": 70.0, "frames": range(1, 6), **change}
-    mapping = settings.pop("mapping")
+    take = Take.about(armature, scene, settings["frames"])
     with pytest.raises(InputError, match=message):
-        run(sample_character(scene, armature, mapping, **settings))
+        run(sample_character(take, armature, settings["mapping"], mass=settings["mass"]))
 
 
 def test_left_and_right_are_not_swapped_whatever_way_the_rig_faces(scene):

@@ -10,7 +10,8 @@ from softground_addon.blender.reading import staleness
 from softground_addon.blender.rigs.rig_mapping import rest_bones
 from softground_addon.blender.sampling.rig_recording import record
 from softground_addon.blender.sampling.skin_sampling import read_skin
-from softground_addon.blender.settings import snapshot, units_of
+from softground_addon.blender.sampling.take import Take
+from softground_addon.blender.settings import snapshot
 from softground_addon.core.rig.rig_skin import skinned
 from tests.blender import shots
 
@@ -112,7 +113,7 @@ def test_the_skin_that_is_read_is_the_skin_that_is_seen(scene, body, shape):
     armature, before = body.parent, {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "scenes")}
     skin = read_skin(scene.objects, armature)
     shapes = [shape.key for shape in skin.shapes]
-    recording = list_of(record(scene, armature, range(1, 21), skin.bones, units_of(scene), shapes=shapes))
+    recording = list_of(record(Take.about(armature, scene, range(1, 21)), armature, skin.bones, shapes=shapes))
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
     read = skinned(skin, rest_bones(armature), recording, np.arange(len(skin.vertices)))
     for frame in FRAMES:

@@ -10,6 +10,7 @@ import pytest
 from softground_addon.blender.jobs import run
 from softground_addon.blender.rigs.rig_mapping import map_rig
 from softground_addon.blender.sampling.rig_sampling import sample_character
+from softground_addon.blender.sampling.take import Take
 from softground_addon.core.rig.mapping import SoleSource
 from softground_addon.core.rig.motion_assembly import _pointing
 from tests.blender import rigs
@@ -26,7 +27,8 @@ def standing(**options):
 
 
 def sample(armature):
-    return run(sample_character(bpy.context.scene, armature, map_rig(armature), mass=70.0, frames=range(1, 11)))
+    take = Take.about(armature, bpy.context.scene, range(1, 11))
+    return run(sample_character(take, armature, map_rig(armature), mass=70.0))
 
 
 def box(x, y, bottom=0.0, top=0.06):
@@ -259,7 +261,7 @@ def test_a_limb_prints_its_skin_however_short_an_importer_made_its_bone(scene, l
         bone.tail = bone.head + (bone.tail - bone.head) * length
     bpy.ops.object.mode_set(mode="OBJECT")
     mapping = replace(map_rig(armature), soles=(SoleSource("shin", "L", "shin.L", limb=True),))
-    motion = run(sample_character(scene, armature, mapping, mass=70.0, frames=range(1, 11)))
+    motion = run(sample_character(Take.about(armature, scene, range(1, 11)), armature, mapping, mass=70.0))
     assert motion.soles[0].sole.prop.extent == pytest.approx((0.6, 0.6, 0.7), rel=0.05)
 
 

@@ -308,11 +308,11 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
 @pytest.mark.slow
 def test_a_depth_that_is_typed_is_that_of_a_bake(shot, capsys):
     options = shot.softground
-    assert prediction.of(shot) is None
+    assert prediction.look(shot)[1] is None
     stiffness = options.material.youngs_modulus
     options.depth_cm = 5.0
     assert options.material.youngs_modulus != stiffness, "a script need not have the shot read first"
-    assert prediction.of(shot) is not None
+    assert prediction.look(shot)[1] is not None
     bpy.ops.softground.bake()
     assert options.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(0.05, rel=0.02)
     stiffness = options.material.youngs_modulus

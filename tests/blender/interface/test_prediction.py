@@ -35,7 +35,7 @@ def drawing(monkeypatch):
         with monkeypatch.context() as patch:
             for heavy in ("estimate_shot", "read_shot", "pressed_contacts", "typical_depth"):
                 patch.setattr(analysis, heavy, fail)
-            return prediction.of(scene)
+            return prediction.look(scene)[1]
 
     return draw
 
@@ -171,7 +171,7 @@ def test_it_is_known_no_more_when_an_undo_has_brought_back_something_else(shot, 
     bpy.ops.softground.predict_depth()
     change(shot)
     handlers.after_undo()
-    assert prediction.of(shot) is None
+    assert prediction.look(shot)[1] is None
 
 
 @pytest.mark.parametrize("change", slow_but_one([another_frame, a_cube, the_view_of_the_ground, softer]))
@@ -180,16 +180,16 @@ def test_it_survives_an_undo_of_something_else(shot, change):
     bpy.ops.softground.predict_depth()
     change(shot)
     handlers.after_undo()
-    assert prediction.of(shot) is not None
+    assert prediction.look(shot)[1] is not None
 
 
 def test_it_survives_that_a_bake_and_its_ground_are_undone(shot):
     bpy.ops.softground.predict_depth()
     bpy.ops.softground.bake()
-    assert prediction.of(shot) is not None
+    assert prediction.look(shot)[1] is not None
     bpy.data.objects.remove(shot.softground.ground)
     handlers.after_undo()
-    assert prediction.of(shot) is not None
+    assert prediction.look(shot)[1] is not None
 
 
 def test_an_edit_of_the_grounds_mesh_ends_it_and_a_bake_does_not(shot):
@@ -198,13 +198,13 @@ def test_an_edit_of_the_grounds_mesh_ends_it_and_a_bake_does_not(shot):
     bpy.ops.softground.bake()
     bpy.context.view_layer.update()
     handlers.compare_prediction()
-    assert prediction.of(shot) is not None
+    assert prediction.look(shot)[1] is not None
     bpy.ops.softground.clear_bake()
     sculpted_ground(shot)
     bpy.context.view_layer.update()
     assert not bpy.app.timers.is_registered(handlers.compare_prediction)  # in background nobody looks at it
     handlers.compare_prediction()
-    assert prediction.of(shot) is None
+    assert prediction.look(shot)[1] is None
 
 
 @pytest.mark.parametrize("depth", [0.03, 0.08])
@@ -215,7 +215,7 @@ def test_a_depth_that_is_typed_or_dragged_is_met_after_a_moment(shot, drawing, d
         pass
     assert drawing(shot).is_current
     prediction.aim_at(shot, depth)
-    assert prediction.shown_cm(shot) == pytest.approx(100 * depth)
+    assert prediction.shown_cm(shot.softground) == pytest.approx(100 * depth)
     while prediction._work_out() is not None:
         pass
     assert analysis.expected_depth(shot) == pytest.approx(depth, rel=0.005)
@@ -233,6 +233,20 @@ def test_a_bake_ends_the_search_for_a_depth_that_was_typed(shot, drawing):
     prediction.aim_at(shot, 0.04)
     jobs.run(prediction.settling(shot.session_uid))
     assert analysis.expected_depth(shot) == pytest.approx(0.04, rel=0.005)
+
+
+def test_a_scene_may_be_deleted_while_its_depth_is_worked_out(shot, drawing):
+    analysis.read(shot)
+    drawing(shot)
+    while prediction._work_out() is not None:
+        pass
+    drawing(shot)
+    prediction.aim_at(shot, 0.04)
+    settling = prediction.settling(shot.session_uid)
+    next(settling)
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    compat.remove_scene(shot)
+    jobs.run(settling)
 
 
 def test_what_was_typed_is_forgotten_where_the_stiffness_is_set(shot, drawing):

@@ -77,7 +77,7 @@ def test_a_redraw_takes_the_settings_down_once(short_walk, monkeypatch):
     short_walk.softground.material.youngs_modulus *= 2
     redraw(bpy.context)
     assert snapshot.call_count == 2
-    assert not prediction.of(short_walk).is_current
+    assert not prediction.look(short_walk)[1].is_current
 
 
 def test_who_is_deleted_in_the_viewport_and_comes_back_is_there_again(scene):
