@@ -32,15 +32,12 @@ def _sizes(
 ) -> tuple[float, float]:
     if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
         return 0.0, 0.0
-    bones, leg = armature.data.bones, 0.0
+    bones = armature.data.bones
     heads, world = np.zeros((len(bones), 3), dtype=np.float32), np.array(armature.matrix_world)
     bones.foreach_get("head_local", heads.reshape(-1))
-    names = [f"{joint}_{side}" for side in "lr" for joint in ("hip", "knee", "ankle")]
-    legs = [mapping.joints.get(name, ("", "")) for name in names]
-    if all(bone in bones for bone, _ in legs):
-        ends = np.array([getattr(bones[bone], f"{end}_local") for bone, end in legs]).reshape(2, 3, 3)
-        leg = float(np.linalg.norm(np.diff(ends, axis=1) @ world[:3, :3].T, axis=-1).sum(axis=1).mean())
-    sizes = sizes_at_rest(heads.astype(float), world, mapping, leg, has_skin=has_skin)
+    mapped = ((joint, bones.get(bone), f"{end}_local") for joint, (bone, end) in mapping.joints.items())
+    joints = {joint: np.array(getattr(bone, end)) for joint, bone, end in mapped if bone}
+    sizes = sizes_at_rest(heads.astype(float), joints, world, mapping.legs, has_skin=has_skin)
     return sizes[0] * unit_scale, sizes[1] * unit_scale
 
 

@@ -120,8 +120,8 @@ def assemble_motion(
         joints[CENTRE] = centre_of_volume(skin, bones, recording)
 
     heads = np.array([bone.head for bone in bones.values()])
-    placed, has_skin = recording.armature[0], skin is not None
-    tall, large = sizes_at_rest(heads, placed, mapping, leg, has_skin=has_skin)
+    at_rest = {joint: bones[bone].end(end) for joint, (bone, end) in mapping.joints.items()}
+    tall, large = sizes_at_rest(heads, at_rest, recording.armature[0], mapping.legs, has_skin=skin is not None)
     return CharacterMotion(
         name=name,
         mass=mass,

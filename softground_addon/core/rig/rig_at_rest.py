@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,12 +66,7 @@ class RestPose:
 
     def leg_length(self, mapping: RigMapping) -> float:
         """Thigh and shank together, or about half the rig's height where they are not mapped."""
-        lengths = []
-        for side in "lr":
-            joints = [f"hip_{side}", f"knee_{side}", f"ankle_{side}"]
-            if all(joint in mapping.joints for joint in joints):
-                points = np.array([self.end(*mapping.joints[joint]) for joint in joints])
-                lengths.append(float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()))
+        lengths = _leg_lengths({joint: self.end(*place) for joint, place in mapping.joints.items()})
         if lengths and min(lengths) > 0:
             return float(np.mean(lengths))
         ends = np.array([self.end(bone, end) for bone in self.bones for end in ("head", "tail")])
@@ -103,7 +99,7 @@ class RestPose:
 
 
 def sizes_at_rest(
-    heads: Array, to_world: Array, mapping: RigMapping, leg: float, *, has_skin: bool
+    heads: Array, joints: Mapping[str, Array], to_world: Array, legs: int, *, has_skin: bool
 ) -> tuple[float, float]:
     """`CharacterMotion.stature` and `size` of a rig at rest, in the units of the world.
 
@@ -111,13 +107,25 @@ def sizes_at_rest(
     ----------
     heads : (N, 3) float array
         Of its bones, in the armature's space.
+    joints : mapping of str to (3,) float array
+        Those that are mapped, there too.
     to_world : (4, 4) float array
         From there to the world.
-    leg : float
-        Thigh and shank together.
+    legs : int
+        Number of legs that print.
     """
     sizes = stature(heads, to_world), extent(heads, to_world)
-    return sizes_by_legs(*sizes, leg, has_skin=has_skin) if has_two_legs(mapping.joints, mapping.legs) else sizes
+    if not has_two_legs(joints, legs):
+        return sizes
+    leg = float(np.mean(_leg_lengths({joint: to_world[:3, :3] @ place for joint, place in joints.items()})))
+    return sizes_by_legs(*sizes, leg, has_skin=has_skin)
+
+
+def _leg_lengths(joints: Mapping[str, Array]) -> list[float]:
+    """Thigh and shank together of each leg whose joints are known."""
+    legs = ([f"{joint}_{side}" for joint in ("hip", "knee", "ankle")] for side in "lr")
+    lines = [np.diff([joints[joint] for joint in leg], axis=0) for leg in legs if joints.keys() >= {*leg}]
+    return [float(np.linalg.norm(line, axis=1).sum()) for line in lines]
 
 
 def _own_up(bones: RigBones, mapping: RigMapping, placed: Array) -> Array:
