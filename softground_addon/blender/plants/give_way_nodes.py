@@ -250,27 +250,27 @@ def _given_way(
     """The geometry moved, or as it was where no sole has touched any of its plants, which `each` numbers, and no wind
     does."""
     place = in_cells(graph, table, root)
-    found, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
+    plants, (place,) = graph.captured(geometry, graph.number(place), kinds="VECTOR", domain=domain)
     place = place.socket
     # Height by which snow lifts what stands on it, where that does not sink by itself.
     snow = graph.number(graph.choose("FLOAT", table.sinks, raised_at(graph, table, root), 0.0))
     is_lifted = snow.above(0.0)
-    is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, found, is_lifted.socket, domain), 0)
-    is_near = graph.either(table.is_windy.socket, any_of(graph, found, is_over(graph, table, place), domain))
+    is_any_lifted = graph.choose("INT", table.sinks, any_of(graph, plants, is_lifted.socket, domain), 0)
+    is_near = graph.either(table.is_windy.socket, any_of(graph, plants, is_over(graph, table, place), domain))
     is_near = graph.either(is_near, is_any_lifted)
     latest = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, place), "INT")
-    found, (latest,) = graph.captured(found, graph.number(latest), kinds="INT", domain=domain)
+    plants, (latest,) = graph.captured(plants, graph.number(latest), kinds="INT", domain=domain)
     is_touched = latest.above(0.5).at_least(table.is_windy).at_least(is_lifted).socket
-    touched = any_of(graph, found, is_touched, domain)
+    touched = any_of(graph, plants, is_touched, domain)
 
     random = graph.node("FunctionNodeRandomValue", data_type="FLOAT")
     if each is not None:
         graph.link(each, next(socket for socket in random.inputs if socket.name == "ID"))
     chance = graph.number(next(socket for socket in random.outputs if socket.enabled))
-    sent_off, sent, there, acting = litter_nodes.sent_off(graph, table, passes, found, domain, place, latest, chance)
-    found = graph.choose("GEOMETRY", table.stands, sent_off, found)
+    sent_off, sent, landing, acting = litter_nodes.sent_off(graph, table, passes, plants, domain, place, latest, chance)
+    plants = graph.choose("GEOMETRY", table.stands, sent_off, plants)
     acting = graph.choose("INT", table.stands, acting, latest.socket)
-    place = graph.choose("VECTOR", table.stands, there, place)
+    place = graph.choose("VECTOR", table.stands, landing, place)
     lean, further, share, ground = (
         graph.at_index(passes.vertices, value, acting)
         for value in (passes.lean, passes.further, passes.share, passes.ground)
@@ -294,12 +294,12 @@ def _given_way(
     if domain != "INSTANCE":
         shift = graph.vector("SUBTRACT", shift, graph.scaled(lean, graph.separated(place)[2]))
     fields = (graph.number(lean), graph.number(shift), bent)
-    changed, captured = graph.captured(found, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
+    changed, captured = graph.captured(plants, *fields, kinds=("VECTOR", "VECTOR", "FLOAT"), domain=domain)
     lean, shift, bent = (number.socket for number in captured)
     moved = _Moved(lean, shift, bent, is_touched)
     changed = graph.store(changed, BENT, moved.bent, True, domain=domain)
-    moved_there = graph.choose("GEOMETRY", touched, geometry, move(changed, moved))
-    return graph.choose("GEOMETRY", is_near, geometry, moved_there)
+    given_way = graph.choose("GEOMETRY", touched, geometry, move(changed, moved))
+    return graph.choose("GEOMETRY", is_near, geometry, given_way)
 
 
 def _put(graph: NodeGraph, table: Table, position: Any, geometry: Any, moved: _Moved) -> Any:

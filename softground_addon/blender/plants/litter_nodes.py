@@ -54,7 +54,7 @@ def sent_off(
     inputs = {"Vector": sent, "Angle": angle.socket}
     sent = graph.node("ShaderNodeVectorRotate", inputs, rotation_type="Z_AXIS").outputs["Vector"]
     geometry, (sent,) = graph.captured(geometry, graph.number(sent), kinds="VECTOR", domain=domain)
-    there = graph.vector("MULTIPLY_ADD", sent.socket, (1.0, 1.0, 0.0), place)
-    acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, there), "INT")
+    landing = graph.vector("MULTIPLY_ADD", sent.socket, (1.0, 1.0, 0.0), place)
+    acting = graph.at_index(passes.counted, passes.latest, slot_of(graph, table, landing), "INT")
     geometry, (acting,) = graph.captured(geometry, graph.number(acting), kinds="INT", domain=domain)
-    return geometry, sent.socket, there, acting.socket
+    return geometry, sent.socket, landing, acting.socket
