@@ -98,7 +98,7 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
-        bpy.types.Material.softground_preset = bpy.props.StringProperty(
+        bpy.types.Material.softground_preset = bpy.props.StringProperty(  # type: ignore[assignment]
             name="Ground Preset",
             description="File name of the preset of the ground that has this material, 'none' of a hard floor; empty "
             "for the ground's own",

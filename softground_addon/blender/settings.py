@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any
 
 import bpy
 
@@ -35,7 +35,7 @@ STANDARD_GRAVITY = 9.81
 
 def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     """The context's scene, which an operator or a panel always has."""
-    return cast("bpy.types.Scene", context.scene)
+    return context.scene
 
 
 def scene_with(uid: int) -> bpy.types.Scene | None:
@@ -53,7 +53,7 @@ def scene_named(name: ObjectName) -> bpy.types.Scene:
 
 def options_of(context: bpy.types.Context) -> Any:
     """The settings of the context's scene."""
-    return cast("Any", context.scene).softground
+    return context.scene.softground
 
 
 def exists(obj: bpy.types.Object | None) -> bool:

@@ -74,16 +74,17 @@ class SoftGroundHardGround(bpy.types.PropertyGroup):
     )
 
 
-UNDER = EnumProperty(
-    name="Under-Layer",
-    description="When prints show what lies below the layer: earth under snow, wet sand under dry",
-    items=[
-        ("AUTO", "Where Thin", "Where the layer is up to 8 cm deep"),
-        ("ALWAYS", "Always", "Wherever feet press through most of the layer, however deep it is"),
-        ("NEVER", "Never", "Prints look like the layer all the way down"),
-    ],
-    default="AUTO",
-)
+def _under() -> Any:
+    return EnumProperty(
+        name="Under-Layer",
+        description="When prints show what lies below the layer: earth under snow, wet sand under dry",
+        items=[
+            ("AUTO", "Where Thin", "Where the layer is up to 8 cm deep"),
+            ("ALWAYS", "Always", "Wherever feet press through most of the layer, however deep it is"),
+            ("NEVER", "Never", "Prints look like the layer all the way down"),
+        ],
+        default="AUTO",
+    )
 
 
 class SoftGroundFurtherGround(bpy.types.PropertyGroup):
@@ -94,7 +95,7 @@ class SoftGroundFurtherGround(bpy.types.PropertyGroup):
     )
     material: PointerProperty(name="Material", type=SoftGroundMaterial)
     painted: PointerProperty(name="Masks", type=SoftGroundPainted)
-    under: UNDER
+    under: _under()
 
 
 class SoftGroundPrinted(bpy.types.PropertyGroup):
@@ -174,7 +175,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_max=20.0,
         precision=1,
     )
-    under: UNDER
+    under: _under()
     detail: EnumProperty(
         name="Detail",
         translation_context=CONTEXT,

@@ -50,7 +50,7 @@ def _added(
     options = scene.softground
     before = len(options.characters), options.active_character, options.frame_start, options.frame_end
     fresh, material = ground_presets.untouched(options), options.material
-    sizes = [(options, "cell_size"), (options, "cells_along_sole"), (options, "length_scale")]
+    sizes: list[tuple[Any, str]] = [(options, "cell_size"), (options, "cells_along_sole"), (options, "length_scale")]
     sizes += [(material, "rim_reach"), (material, "blur_sigma")]
     fitted = [(group, field, getattr(group, field)) for group, field in sizes]
     stays = False
