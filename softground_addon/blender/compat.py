@@ -20,10 +20,10 @@ def action_curves(action: bpy.types.Action, slot: Any = None) -> list[bpy.types.
     """The action's curves: those of one slot, of all slots if none is given, or the whole action before slots."""
     if not HAS_SLOTS:
         return list(action.fcurves)
+    strips: list[Any] = [strip for layer in action.layers for strip in layer.strips]
     return [
         curve
-        for layer in action.layers
-        for strip in layer.strips
+        for strip in strips
         for bag in strip.channelbags
         if slot is None or bag.slot_handle == slot.handle
         for curve in bag.fcurves
@@ -35,7 +35,7 @@ def new_channels(action: bpy.types.Action, name: str) -> tuple[Any, Any]:
     if not HAS_SLOTS:
         return None, action.fcurves
     slot = action.slots.new(id_type="OBJECT", name=name)
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    strip: Any = action.layers.new("Layer").strips.new(type="KEYFRAME")
     return slot, strip.channelbag(slot, ensure=True).fcurves
 
 
@@ -44,7 +44,7 @@ def channels_of(action: bpy.types.Action, slot: Any) -> Any:
     if not HAS_SLOTS:
         return action.fcurves
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
-    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    strip: Any = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
     return strip.channelbag(slot, ensure=True).fcurves
 
 
@@ -74,7 +74,7 @@ def node_inputs(modifier: Any) -> list[tuple[str, Any]]:
     sockets = [] if tree is None else [item for item in tree.interface.items_tree if item.item_type == "SOCKET"]
     names = [socket.identifier for socket in sockets if socket.in_out == "INPUT"]
     if hasattr(modifier, "properties"):
-        held = [(name, getattr(modifier.properties.inputs, name, None)) for name in names]
+        held: list[tuple[str, Any]] = [(name, getattr(modifier.properties.inputs, name, None)) for name in names]
         return [(name, holder.value) for name, holder in held if hasattr(holder, "value")]
     return [(name, modifier[name]) for name in names if name in modifier.keys()]  # noqa: SIM118  (no mapping)
 

@@ -83,7 +83,7 @@ def default_preset() -> Preset:
 
 def _preferred() -> str:
     """The preset that the user's preferences name; in background the add-on's own, for farms to bake alike."""
-    add_on = bpy.context.preferences.addons.get(ADD_ON)
+    add_on: Any = bpy.context.preferences.addons.get(ADD_ON)
     if bpy.app.background or add_on is None or add_on.preferences is None:
         return presets.DEFAULT
     return str(add_on.preferences.default_preset)

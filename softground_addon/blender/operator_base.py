@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import bpy
 
@@ -17,13 +17,14 @@ from .remedies import said
 from .translation import translated
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
+OperatorResult = set[Literal["RUNNING_MODAL", "CANCELLED", "FINISHED", "PASS_THROUGH", "INTERFACE"]]
 
 
-def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -> Callable[..., set[str]]:
+def reports_errors(execute: Callable[[Operator, bpy.types.Context], OperatorResult]) -> Callable[..., OperatorResult]:
     """Turn a `SoftGroundError` into a report and CANCELLED; nothing else is caught."""
 
     @wraps(execute)
-    def guarded(self: Operator, context: bpy.types.Context) -> set[str]:
+    def guarded(self: Operator, context: bpy.types.Context) -> OperatorResult:
         try:
             return execute(self, context)
         except SoftGroundError as error:
@@ -94,7 +95,7 @@ class Act(Checked):
     bl_options: Any = {"REGISTER", "UNDO"}
 
     @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> OperatorResult:
         self.act(context)
         return {"FINISHED"}
 

@@ -35,7 +35,7 @@ def world_matrix(obj: bpy.types.Object) -> Array:
     basis = np.array(obj.matrix_basis, dtype=np.float64)
     if parent is None:
         return basis
-    if obj.parent_type != "OBJECT" or (parent.type == "CURVE" and parent.data.use_path):
+    if obj.parent_type != "OBJECT" or (parent.type == "CURVE" and getattr(parent.data, "use_path", False)):
         return np.array(obj.matrix_world, dtype=np.float64)
     return np.asarray(world_matrix(parent) @ np.array(obj.matrix_parent_inverse) @ basis)
 
@@ -59,16 +59,16 @@ def still_frame(place: Array, units: SceneUnits, direction: Direction) -> Ground
 
 def felt_gravity(direction: Direction, bodies: Iterable[bpy.types.Object]) -> Direction:
     """Where gravity points for some bodies: as the scene's does, unless they all stand upright in another one."""
-    rigs = [body for body in bodies if body.type == "ARMATURE" and body.data.bones]
+    rigs = [(body, body.data.bones) for body in bodies if isinstance(body.data, bpy.types.Armature) and body.data.bones]
     if direction == DOWN or not rigs:
         return direction
-    return direction if any(_above_origin(rig) @ direction < -LEANING for rig in rigs) else DOWN
+    return direction if any(_above_origin(rig, bones) @ direction < -LEANING for rig, bones in rigs) else DOWN
 
 
-def _above_origin(rig: bpy.types.Object) -> Array:
+def _above_origin(rig: bpy.types.Object, bones: bpy.types.ArmatureBones) -> Array:
     """Unit vector in the world from the origin of a rig to the middle of its bones at rest."""
-    heads = np.empty(len(rig.data.bones) * 3)
-    rig.data.bones.foreach_get("head_local", heads)
+    heads = np.empty(len(bones) * 3)
+    bones.foreach_get("head_local", heads)
     toward = world_matrix(rig)[:3, :3] @ heads.reshape(-1, 3).mean(axis=0)
     return np.asarray(toward / max(float(np.linalg.norm(toward)), TINY))
 

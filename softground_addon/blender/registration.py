@@ -96,9 +96,9 @@ def register() -> None:
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
         for owner, group in _SETTINGS:
-            owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
+            owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)  # type: ignore[func-returns-value]
             undo.callback(delattr, owner, "softground")
-        bpy.types.Material.softground_preset = bpy.props.StringProperty(  # type: ignore[assignment]
+        bpy.types.Material.softground_preset = bpy.props.StringProperty(  # type: ignore[assignment, func-returns-value]
             name="Ground Preset",
             description="File name of the preset of the ground that has this material, 'none' of a hard floor; empty "
             "for the ground's own",
@@ -124,7 +124,7 @@ def register() -> None:
         undo.callback(overlay.unregister)
         undo.callback(prediction.unregister)
         undo.callback(preset_icons.unregister)
-        command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
+        command = bpy.utils.register_cli_command("softground", cli.run_in_blender)  # type: ignore[func-returns-value]
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())
 

@@ -151,7 +151,7 @@ def chosen_steps() -> tuple[str, ...]:
 
 def is_rendering() -> bool:
     """True if Blender renders beside what its user does."""
-    return bool(bpy.app.is_job_running("RENDER"))
+    return bool(bpy.app.is_job_running("RENDER"))  # type: ignore[func-returns-value]
 
 
 def redraw(*, region_type: str = "UI") -> None:

@@ -28,7 +28,7 @@ _OWNER = object()
 
 def translated(text: str, /, **values: Any) -> str:
     """A text in the language of the interface, with values in the place of its `{names}`."""
-    ours = str(bpy.app.translations.pgettext_iface(text, CONTEXT))
+    ours = str(bpy.app.translations.pgettext_iface(text, CONTEXT))  # type: ignore[func-returns-value]
     return ours.format(**values) if values else ours
 
 

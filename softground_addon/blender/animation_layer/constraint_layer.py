@@ -11,7 +11,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import Enum
 from itertools import groupby
-from typing import Any
+from typing import Any, cast
 
 import bpy
 
@@ -95,13 +95,13 @@ def put_layer(
     for key, text in notes.items():
         helper[key] = text
     remove_layer(armature, kind)
-    helper.name = helper.data.name = kind.value
+    helper.name = cast("bpy.types.ID", helper.data).name = kind.value
     action.name = f"{armature.name} {kind.value.removeprefix('SoftGround ')}"
     # A property counts as a user, and is appended with the rig; overrides lose theirs.
     armature[kind.value] = helper
     helper.use_fake_user = armature.override_library is not None
     for bone in bones:
-        _new_constraint(armature.pose.bones[bone] if bone else armature, kind, helper, bone)
+        _new_constraint(cast("bpy.types.Pose", armature.pose).bones[bone] if bone else armature, kind, helper, bone)
     armature.update_tag(refresh={"OBJECT", "DATA", "TIME"})
 
 

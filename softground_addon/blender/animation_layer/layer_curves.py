@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -33,7 +33,7 @@ class LayerCurve:
     values: Array
 
 
-_LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
+_LINEAR = cast("Any", bpy.types.Keyframe.bl_rna.properties["interpolation"]).enum_items["LINEAR"].value
 
 
 def new_action(name: str, obj: bpy.types.Object, curves: Sequence[LayerCurve]) -> bpy.types.Action:

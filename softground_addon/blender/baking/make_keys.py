@@ -27,6 +27,7 @@ from ..reading.shots import settings_of
 from ..response import response_job
 from ..response.character_keys import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ..rigs.frame_ranges import animated_frames
+from ..rigs.object_data import pose_bones
 from ..sampling.sampling_scene import depsgraph_at, object_named, sampling_scene
 from ..sampling.take import Take
 from ..translation import translated
@@ -139,7 +140,7 @@ def _read(take: Take, name: str, start: float, share: float) -> Job[dict[str, li
     armature = object_named(name)
     frames, units = take.frames, take.units
     bones = list(owners_of(armature))
-    watched = list(filter(None, bones)) or [armature.pose.bones[0].name]
+    watched = list(filter(None, bones)) or [pose_bones(armature)[0].name]
     poses = np.empty((len(frames), len(bones), 4, 4))
     turns: dict[str, list[tuple[float, ...]]] = {bone: [] for bone in bones}
     places = np.empty((len(frames), len(bones), 3))
@@ -147,7 +148,7 @@ def _read(take: Take, name: str, start: float, share: float) -> Job[dict[str, li
         for done, frame in enumerate(frames):
             evaluated = object_named(name).evaluated_get(depsgraph_at(temporary, frame))
             for place, bone in enumerate(bones):
-                owner = evaluated.pose.bones[bone] if bone else evaluated
+                owner = pose_bones(evaluated)[bone] if bone else evaluated
                 poses[done, place] = _local(evaluated, bone)
                 places[done, place] = owner.location
                 turns[bone].append(tuple(owner.rotation_euler[:]))
@@ -155,7 +156,7 @@ def _read(take: Take, name: str, start: float, share: float) -> Job[dict[str, li
     times, size = np.array(frames) * units.time_stretch, units.unit_scale_m * armature.matrix_world.median_scale
     curves: dict[str, list[LayerCurve]] = {}
     for place, bone in enumerate(bones):
-        owner = armature.pose.bones[bone] if bone else armature
+        owner = pose_bones(armature)[bone] if bone else armature
         moved = np.abs(poses[:, place, :3, 3] - places[:, place]).max() > LENGTH_TOLERANCE / size
         if any(not (constraint.mute or is_own(constraint)) for constraint in owner.constraints):
             continue
@@ -175,7 +176,7 @@ def _read(take: Take, name: str, start: float, share: float) -> Job[dict[str, li
 def _local(evaluated: bpy.types.Object, bone: str) -> Array:
     """Pose of a bone as its channels have it, or of an object that only its location was changed of."""
     if bone:
-        pose = evaluated.pose.bones[bone]
+        pose = pose_bones(evaluated)[bone]
         above = {}
         if pose.parent:
             above = {"parent_matrix": pose.parent.matrix, "parent_matrix_local": pose.parent.bone.matrix_local}
@@ -183,12 +184,10 @@ def _local(evaluated: bpy.types.Object, bone: str) -> Array:
     world = evaluated.matrix_world.to_3x3()
     basis = evaluated.matrix_basis.copy()
     from_world = (world @ basis.to_3x3().inverted()).inverted()
-    for layer in (
-        constraint
-        for constraint in evaluated.constraints
-        if is_own(constraint) and not constraint.mute and constraint.target
-    ):
-        basis.translation += from_world @ (layer.influence * layer.target.matrix_world.translation)
+    layer: Any
+    for layer in evaluated.constraints:
+        if is_own(layer) and not layer.mute and layer.target:
+            basis.translation += from_world @ (layer.influence * layer.target.matrix_world.translation)
     return np.array(basis)
 
 

@@ -83,8 +83,8 @@ def _gravity(gravity: Vector, wanted: BakeSettings) -> Iterator[Finding]:
         yield Finding(
             "gravity_direction",
             "note",
-            f"Gravity of scene '{wanted.scene.name}' points along ({', '.join(f'{part:g}' for part in gravity)}), but "
-            "no character stands upright in it: bodies weigh straight down in the bake, by "
+            f"Gravity of scene '{wanted.scene.name}' points along ({', '.join(f'{part:g}' for part in gravity[:])}), "
+            "but no character stands upright in it: bodies weigh straight down in the bake, by "
             f"{wanted.gravity_m_s2:.2f} m/s².",
             "Set Gravity in the Scene properties to point where the feet of the characters do.",
         )
@@ -123,7 +123,7 @@ def _distance(movers: Iterable[bpy.types.Object], wanted: BakeSettings) -> Itera
 def _is_rounded(node: bpy.types.Object, far: float) -> bool:
     """True if something moves an object to places that are far away themselves, about as far as that."""
     keyed = any(path.startswith("location") for path, _ in animated_paths(node))
-    owners = (node, *(node.pose.bones if node.type == "ARMATURE" else ()))
+    owners = (node, *(node.pose.bones if node.pose else ()))
     constraints = (constraint for owner in owners for constraint in owner.constraints if not is_own(constraint))
     is_held = any(not constraint.mute and constraint.influence for constraint in constraints)
     return is_held or (keyed and float(np.abs(np.array(node.location)).max()) > far / 2)
@@ -173,7 +173,7 @@ def _lacks(owner: Any) -> str:
 
 def _idle_drivers(objects: Iterable[bpy.types.Object]) -> Iterator[Finding]:
     """Drivers that Blender could not evaluate as the shot was read."""
-    owners = dict.fromkeys(node for obj in objects for node in (obj, obj.data) if node and node.animation_data)
+    owners: Any = dict.fromkeys(node for obj in objects for node in (obj, obj.data) if node and node.animation_data)
     idle = [
         (owner.name, curve.data_path)
         for owner in owners

@@ -26,6 +26,7 @@ from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import curves_of, inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
 from ..playback import weather_modifier
+from ..rigs.object_data import mesh_of
 from . import marks_nodes as nodes
 from .marks_material import material_for, reads_clock
 
@@ -51,7 +52,7 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     if marks is None or not len(marks.faces):
         return None
     modifier: Any = _modifier_of(older) if older else None
-    before = Vector(older.data.get(ORIGIN, older.location)) if older else Vector()
+    before = Vector(mesh_of(older).get(ORIGIN, older.location)) if older else Vector()
     with none_left_if_it_fails():
         mesh = _mesh(marks, surface, units)
         group = _group_for(modifier and modifier.node_group, surface, units)
@@ -60,7 +61,7 @@ def put(ground: bpy.types.Object, marks: Marks | None, *, surface: str, units: S
     obj = older or bpy.data.objects.new(NAME, mesh)
     if older:
         if len(mesh.materials):
-            older.data.materials.clear()
+            mesh_of(older).materials.clear()
         exchange(older, mesh)
     obj.location += Vector(mesh[ORIGIN]) - before
     BELONGS.give(ground, obj)

@@ -12,6 +12,7 @@ from ...core.errors import InputError
 from ...core.numerics.components import components
 from ..properties import SoftGroundCharacter
 from ..rigs.libraries import check_libraries
+from ..rigs.object_data import armature_of, mesh_of
 from .character_setup import title_of
 
 
@@ -58,7 +59,7 @@ def add_vertex_contacts(character: SoftGroundCharacter, skin: bpy.types.Object) 
     edges = np.zeros(2 * len(mesh.edges), dtype=np.int32)
     mesh.edges.foreach_get("vertices", edges)
     start, other = edges.reshape(-1, 2)[chosen[edges.reshape(-1, 2)].all(axis=1)].T
-    patch, bones = components(len(chosen), start, other), character.armature.data.bones
+    patch, bones = components(len(chosen), start, other), armature_of(character.armature).bones
     carried: dict[str, set[str]] = {}
     for number in np.unique(patch[chosen]):
         weights: dict[str, float] = {}
@@ -123,7 +124,7 @@ def check_printable(options: Any, obj: bpy.types.Object) -> None:
         )
     if obj == options.ground:
         raise InputError(f"'{obj.name}' is the ground: select what moves on it.")
-    if not obj.data.polygons and not obj.modifiers:
+    if not mesh_of(obj).polygons and not obj.modifiers:
         raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or select another object.")
     for character in options.characters:
         if any(sole.object == obj for sole in character.soles):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -30,7 +30,7 @@ def sizes_of(unit_scale: float, character: Any) -> tuple[float, float]:
 def _sizes(
     unit_scale: float, armature: bpy.types.Object, mapping: RigMapping, *, has_skin: bool
 ) -> tuple[float, float]:
-    if not armature.data or not len(armature.data.bones):  # a linked rig whose library is gone has no data
+    if not isinstance(armature.data, bpy.types.Armature) or not armature.data.bones:  # its library is gone
         return 0.0, 0.0
     bones = armature.data.bones
     heads, world = np.zeros((len(bones), 3), dtype=np.float32), np.array(armature.matrix_world)
@@ -136,14 +136,14 @@ def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDA
             for point in (key.handle_left, key.handle_right, key.co):
                 point.y += slope * (point.x - options.frame_start * units.time_stretch)
         curve.update()
-        curve.id_data.update_tag()
+        cast("bpy.types.Action", curve.id_data).update_tag()
 
 
 def _travels(empty: bpy.types.Object) -> list[bpy.types.FCurve]:
     """Curves of the place of an empty; none where they do not move it level, or are not its own alone."""
     animation = empty.animation_data
     action = animation.action if animation else None
-    if not action or action.library or action.users - action.use_fake_user > 1 or animation.nla_tracks:
+    if not animation or not action or action.library or action.users - action.use_fake_user > 1 or animation.nla_tracks:
         return []
     slot = slot_of(animation)
     curves = [] if HAS_SLOTS and slot is None else action_curves(action, slot)

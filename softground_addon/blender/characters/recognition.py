@@ -21,6 +21,7 @@ from ...core.rig.skin_mass import skin_mass
 from ...core.rig.sole_extraction import bone_families
 from ...core.settings import ObjectName
 from .. import jobs
+from ..rigs.object_data import armature_of
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_checks import is_animated
@@ -101,7 +102,7 @@ def recognise(
         bare = _on_all_fours(armature, _mapped(armature, skinned=False), _mapped(armature, named=False, skinned=False))
         return Recognised(bare if bare.soles else _mapped(armature, posed=True))
     take = Take.about(armature, scene, range(scene.frame_current, scene.frame_current + 1))
-    moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
+    moves = bool(frames) and is_animated(armature) and armature_of(armature).pose_position != "REST"
     if frames and moves:
         first, last = (round(frame / take.units.time_stretch) for frame in frames)
         take = replace(take, frames=range(first, min(last, first + MOST_FRAMES) + 1))

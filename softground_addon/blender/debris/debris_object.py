@@ -21,6 +21,7 @@ from ..belongings import Belonging, exchange
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on, matrix_in
+from ..rigs.object_data import mesh_of
 from ..settings import find, name_of
 from . import debris_nodes as nodes
 from . import debris_shapes
@@ -95,7 +96,7 @@ def put(
 
 def _origin_of(debris: bpy.types.Object) -> Vector:
     """Origin of its points in the world, if the user has not moved it [Blender units]."""
-    return Vector(cast("bpy.types.Mesh", debris.data).get(ORIGIN, debris.matrix_parent_inverse.inverted().translation))
+    return Vector(mesh_of(debris).get(ORIGIN, debris.matrix_parent_inverse.inverted().translation))
 
 
 def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
@@ -137,7 +138,7 @@ class Pieces:
     """
 
     def __init__(self, debris: bpy.types.Object, unit_scale: float) -> None:
-        points = cast("bpy.types.Mesh", debris.data)
+        points = mesh_of(debris)
         at = mesh_arrays.positions(points).astype(np.float64) + np.array(_origin_of(debris))
         self._name, self.place = name_of(debris), at[:, :2] * unit_scale
         self._radius, self.step = np.empty(len(at), np.float32), np.empty(len(at), np.int32)
@@ -147,7 +148,7 @@ class Pieces:
     def hide(self, hidden: NDArray[np.bool_]) -> None:
         """Show all but some of them (N,)."""
         if (debris := find(self._name)) is not None:
-            points = cast("bpy.types.Mesh", debris.data)
+            points = mesh_of(debris)
             radius: Any = points.attributes[nodes.RADIUS]
             radius.data.foreach_set("value", np.where(hidden, np.float32(0.0), self._radius))
             points.update()

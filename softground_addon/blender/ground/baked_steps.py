@@ -19,6 +19,7 @@ from ...core.record.contact_steps import PressingSole, Steps
 from ...core.record.edits import UNCHANGED, StepEdit, feet, sole_of
 from ...core.record.footprints import Footprint
 from .. import session
+from ..rigs.object_data import mesh_of
 from ..state import state
 from . import baked_ground
 
@@ -142,7 +143,7 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
         return NOTHING
     try:
         stored = baked_ground.stored_record(ground)
-        key = (baked_ground.display_mesh_of(ground).data.session_uid, bytes(stored[-record.TAIL :]))
+        key = (mesh_of(baked_ground.display_mesh_of(ground)).session_uid, bytes(stored[-record.TAIL :]))
         if key not in state.shown_bake:
             loaded = record.load(bytes(stored))
             soles = feet(loaded.footprints)

@@ -204,7 +204,7 @@ def made_shape(ground: bpy.types.Object) -> str:
     for layer, uv in zip(mesh.uv_layers, values[1:], strict=True):
         layer.uv.foreach_get("vector", uv)
     names = sorted(item.name for item in mesh.attributes if not item.name.startswith("."))
-    said = repr(([tuple(row) for row in ground.matrix_basis], names, [crc32(each.tobytes()) for each in values]))
+    said = repr(([tuple(row[:]) for row in ground.matrix_basis[:]], names, [crc32(each.tobytes()) for each in values]))
     return f"{crc32(said.encode()):08x}"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -22,14 +22,10 @@ from .. import mesh_arrays
 from ..plants import trampling_table
 from ..playback import display_key, own_data, playback, weather_modifier
 from ..playback.own_data import AGE, COMPRESSION, FRAME, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
+from ..rigs.object_data import mesh_of
 
 SHOWN = ("steps", "max_depth_m", "typical_depth_m", "peak_force_n")
 """Numbers that every summary has."""
-
-
-def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
-    """The mesh of a mesh object."""
-    return cast("bpy.types.Mesh", ground.data)
 
 
 def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -50,7 +46,7 @@ def has_remains(ground: bpy.types.Object) -> bool:
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
     """Stored summary of the bake on a ground; empty if it has none, or an unreadable one."""
-    summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
+    summary: Any = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
     values = summary.to_dict() if hasattr(summary, "to_dict") else {}
     numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in values.values())
     return values if numbers and values.keys() >= set(SHOWN) else {}
@@ -191,7 +187,7 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
     Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
     """
-    attribute = mesh.attributes[REST] if own_data.has_made(mesh, REST) else None
+    attribute: Any = mesh.attributes[REST] if own_data.has_made(mesh, REST) else None
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return mesh_arrays.positions(mesh)
     flat = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
@@ -208,7 +204,8 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
     if not len(positions):
         return
-    mesh.attributes["position"].data.foreach_set("vector", positions.ravel())
+    place: Any = mesh.attributes["position"]
+    place.data.foreach_set("vector", positions.ravel())
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
     mesh.update()

@@ -218,7 +218,7 @@ def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
         return None
     if parent is None:
         return obj.matrix_basis
-    if obj.parent_type in _BY_PARTS or (parent.type == "CURVE" and parent.data.use_path):
+    if obj.parent_type in _BY_PARTS or (parent.type == "CURVE" and getattr(parent.data, "use_path", False)):
         return None
     above = placed_by_parents(parent)
     return None if above is None else above @ obj.matrix_parent_inverse @ obj.matrix_basis

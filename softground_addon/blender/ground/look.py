@@ -13,6 +13,7 @@ import bpy
 from ...core.ground.surfaces import SURFACES
 from ..ground_slots import HARD, MARK, OVER, surface_of, theirs
 from ..materials import materials
+from ..rigs.object_data import mesh_of
 from . import baked_ground
 
 
@@ -34,7 +35,7 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     """
     obj = baked_ground.display_mesh_of(ground)
     if not obj.material_slots:
-        obj.data.materials.append(materials.ensure_material(surface))
+        mesh_of(obj).materials.append(materials.ensure_material(surface))
     _show(obj, surface, over_theirs=True)
     return count_over_theirs(obj)
 
@@ -74,7 +75,7 @@ def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
 
 def _writable_slots(obj: bpy.types.Object) -> Iterator[Any]:
     for slot in obj.material_slots:
-        owner = obj if slot.link == "OBJECT" else obj.data
+        owner: Any = obj if slot.link == "OBJECT" else obj.data
         if owner.library is None:
             yield slot
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from ...core.errors import InputError
 from ...core.ground.variation import CHANNELS
 from ...core.numerics.arrays import Array
 from ..properties import SoftGroundPainted
+from ..rigs.object_data import mesh_of
 
 _SETTINGS = dict(zip(CHANNELS, ("stiffness", "layer_depth", "rim"), strict=True))
 """The setting that names what each channel is painted with."""
@@ -31,7 +33,7 @@ def names_of(ground: bpy.types.Object, painted: Sequence[str]) -> Names:
 
 
 def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
-    attribute = ground.data.attributes.get(name) if name else None
+    attribute = mesh_of(ground).attributes.get(name) if name else None
     if attribute and (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
         raise InputError(
             f"Attribute '{name}' of ground '{ground.name}' is not a float attribute on vertices: convert it in Object "
@@ -39,7 +41,7 @@ def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
         )
     if is_there(ground, name):
         return name
-    if name and name != SoftGroundPainted.bl_rna.properties[setting].default:
+    if name and name != cast("Any", SoftGroundPainted.bl_rna.properties[setting]).default:
         raise InputError(
             f"Ground '{ground.name}' has no vertex group or attribute '{name}': paint one of that name, or leave the "
             "field in Properties > Physics > Masks empty."
@@ -49,7 +51,7 @@ def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
 
 def is_there(ground: bpy.types.Object, name: str) -> bool:
     """True if a ground has a vertex group or an attribute of that name."""
-    return bool(name) and (name in ground.data.attributes or name in ground.vertex_groups)
+    return bool(name) and (name in mesh_of(ground).attributes or name in ground.vertex_groups)
 
 
 def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Array | None:
@@ -70,7 +72,7 @@ def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Arr
         return None
     values = np.ones((len(mesh.vertices), len(CHANNELS)), np.float32)
     for channel, name in enumerate(names):
-        attribute = mesh.attributes.get(name) if name else None
+        attribute: Any = mesh.attributes.get(name) if name else None
         if attribute and (attribute.domain, attribute.data_type) == ("POINT", "FLOAT"):
             column = np.empty(len(mesh.vertices), np.float32)
             attribute.data.foreach_get("value", column)

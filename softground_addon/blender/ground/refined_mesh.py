@@ -19,6 +19,7 @@ from ...core.settings import ObjectName
 from .. import mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..playback import own_data
+from ..rigs.object_data import mesh_of
 from ..settings import resolve
 
 LAYOUT = {
@@ -148,12 +149,12 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
     yield
     edges, corner_edge = yield from face_edges.slices(corner_vertex, face_start)
     edges = np.concatenate([edges, carried.loose_edges.astype(np.int32)])
-    mesh = _mesh_of(name)
+    mesh = mesh_of(resolve(name))
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     mesh_arrays.add_faces(mesh, corner_vertex, face_start, edges, corner_edge)
     del corner_vertex, face_start, corner_edge
     yield
-    position: Any = _mesh_of(name).attributes["position"]
+    position: Any = mesh_of(resolve(name)).attributes["position"]
     position.data.foreach_set("vector", refinement.at_vertices(surface, carried.positions).ravel())
     edge_source = _edge_sources(edges, carried, refinement)
     for layer in carried.layers:
@@ -168,18 +169,14 @@ def building(name: ObjectName, carried: Carried, surface: Surface, refinement: R
         else:
             is_known = (edge_source >= 0).reshape(-1, *[1] * (values.ndim - 1))
             values = np.where(is_known, values[edge_source], 0).astype(values.dtype)
-        _write(_mesh_of(name), layer, values)
+        _write(mesh_of(resolve(name)), layer, values)
     yield
-    mesh = _mesh_of(name)
+    mesh = mesh_of(resolve(name))
     _copy_choices(mesh, carried)
     if carried.groups:
         with none_left_if_it_fails():
             _copy_vertex_groups(mesh, carried, surface, refinement)
     mesh.update()
-
-
-def _mesh_of(name: ObjectName) -> bpy.types.Mesh:
-    return cast("bpy.types.Mesh", resolve(name).data)
 
 
 def _copy_vertex_groups(mesh: bpy.types.Mesh, carried: Carried, surface: Surface, refinement: Refinement) -> None:

@@ -45,7 +45,7 @@ INWARD = 1.0 - 1e-6
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     """The copy that takes the prints in place of a ground, which is hidden meanwhile; no duplicate of it."""
-    detail = ground.get(DETAIL) if hides(ground) else None
+    detail: Any = ground.get(DETAIL) if hides(ground) else None
     stands_in = exists(detail) and detail.get(DETAIL_OF) == ground  # not for a ground that is a duplicate
     return detail if stands_in else None
 

@@ -19,7 +19,8 @@ from ...core.files import files
 from ...core.numerics.arrays import Array
 from ...core.numerics.orientation import quaternions, without_leaps
 from ..animation_layer.layer_curves import LayerCurve, assign_action, new_action
-from ..operator_base import reports_errors
+from ..operator_base import OperatorResult, reports_errors
+from ..rigs.object_data import armature_of, pose_bones
 from ..settings import scene_of, timeline_of, units_of
 from ..translation import translated
 
@@ -67,11 +68,12 @@ def new_rig(context: bpy.types.Context, name: str, skeleton: Skeleton, frames: A
     context.view_layer.objects.active = armature
     armature.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature_of(armature).edit_bones
     for bone, matrix in zip(skeleton.bones, skeleton.rest(), strict=True):
-        made = armature.data.edit_bones.new(bone.name)
+        made = bones.new(bone.name)
         made.head, made.tail = (Vector((point / unit).tolist()) for point in (bone.head, bone.tail))
         made.align_roll(Vector(matrix[:3, 2].tolist()))
-        made.parent = armature.data.edit_bones.get(bone.parent) if bone.parent else None
+        made.parent = bones.get(bone.parent) if bone.parent else None
     bpy.ops.object.mode_set(mode="OBJECT")
     _animate(armature, skeleton, frames, unit)
     return armature
@@ -81,7 +83,7 @@ def _animate(armature: bpy.types.Object, skeleton: Skeleton, frames: Array, unit
     """Key places and turns of all bones."""
     channels, curves = skeleton.channels(), []
     for index, bone in enumerate(skeleton.bones):
-        path = armature.pose.bones[bone.name].path_from_id()
+        path = pose_bones(armature)[bone.name].path_from_id()
         turns = without_leaps(quaternions(channels[:, index, :3, :3]))
         places = channels[:, index, :3, 3] / unit
         for what, values in (("location", places), ("rotation_quaternion", turns)):
@@ -132,7 +134,7 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
         name="Set Scene Range", description="Set the scene's first and last frame to those of the motion", default=True
     )
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> OperatorResult:
         """Ask for the file, unless one was dropped."""
         if self.filepath:
             return self.execute(context)
@@ -140,7 +142,7 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> OperatorResult:
         """Read the whole file, then make the rig."""
         path = Path(bpy.path.abspath(self.filepath))
         body = read_body(path, None if self.up == "AUTO" else self.up)

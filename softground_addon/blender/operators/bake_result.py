@@ -14,7 +14,7 @@ from .. import session, settings
 from ..baking import bake_report
 from ..characters import character_setup
 from ..ground import baked_ground, ground_mesh
-from ..operator_base import Act, OnBake
+from ..operator_base import Act, OnBake, OperatorResult
 from ..translation import translated
 from .panel_base import active_character
 
@@ -69,7 +69,7 @@ class SOFTGROUND_OT_show_warnings(OnBake, Act):
         """The warnings themselves."""
         return "\n".join(warnings_of(settings.scene_of(context).softground.ground))
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 

@@ -13,7 +13,7 @@ from ...core.errors import InputError, SoftGroundError
 from ...core.settings import ObjectName
 from .. import jobs, session, settings
 from ..characters import character_setup
-from ..operator_base import Act, OnShot, reports_errors
+from ..operator_base import Act, OnShot, OperatorResult, reports_errors
 from ..reading import analysis
 from ..remedies import said
 from ..state import state
@@ -80,7 +80,7 @@ class ModalJob(Act):
             result = jobs.run(self._job_of())
         self._show(result)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
         return run(context)
 
@@ -101,7 +101,7 @@ class ModalJob(Act):
         return progress.overall
 
     @reports_errors
-    def _start(self, context: bpy.types.Context) -> set[str]:
+    def _start(self, context: bpy.types.Context) -> OperatorResult:
         self._scene = settings.name_of(settings.scene_of(context))
         self._job = self._job_of()
         self._started = self._ticked = self._show_at = time.perf_counter()
@@ -116,7 +116,7 @@ class ModalJob(Act):
         self._needed = _needed_by_job(self.scene) | _named(_parts_of_bodies(self.scene.softground))
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
-        self._workspace = context.workspace.name
+        self._workspace = context.workspace.name if context.workspace else ""
         manager.progress_begin(0.0, 1.0)
         self._show_status(0.0, translated(self.stage_names["sample"]))
         manager.modal_handler_add(self)
@@ -124,10 +124,10 @@ class ModalJob(Act):
         for window in manager.windows:
             if window != context.window:
                 with context.temp_override(window=window):
-                    bpy.ops.softground.hold_window("INVOKE_DEFAULT")
+                    bpy.ops.softground.hold_window("INVOKE_DEFAULT")  # type: ignore[attr-defined]
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         if self not in state.jobs:
             return {"CANCELLED"}  # ended by `stop`
         if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
@@ -146,7 +146,7 @@ class ModalJob(Act):
         """End the bake as Blender quits or opens another file."""
         self._end()
 
-    def _tick(self) -> set[str]:
+    def _tick(self) -> OperatorResult:
         now = time.perf_counter()
         waited = now - self._ticked
         if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
@@ -243,7 +243,7 @@ class Reading(ModalJob):
     def _done(self, progress: jobs.Progress) -> float:
         return progress.fraction
 
-    def _show(self, result: Reports) -> None:
+    def _show(self, result: Any) -> None:
         for kind, text in result:
             self.report({kind}, text)
 
@@ -261,11 +261,11 @@ class SOFTGROUND_OT_hold_window(bpy.types.Operator):
     bl_label = "Wait for the Bake"
     bl_options = {"INTERNAL"}
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         if not state.jobs:
             return {"FINISHED", "PASS_THROUGH"}
         if event.type == "ESC" and event.value == "PRESS":

@@ -152,7 +152,7 @@ class Listed(bpy.types.UIList):
     """A list of which each row is drawn by `draw_row`."""
 
     def draw_item(
-        self, _c: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+        self, _c: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, *_: Any
     ) -> None:
         self.draw_row(layout, item)
 

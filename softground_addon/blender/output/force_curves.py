@@ -145,7 +145,7 @@ def _path_of(name: str) -> str:
     return f'["{bpy.utils.escape_identifier(name)}"]'
 
 
-def _animate(obj: bpy.types.Object, name: str, frames: Array, values: Array, *, constant: bool) -> None:
+def _animate(obj: Any, name: str, frames: Array, values: Array, *, constant: bool) -> None:
     """Key a custom property at every frame."""
     obj[name] = 0.0
     obj.id_properties_ui(name).update(min=0.0, description="Normal force of the ground in newtons")

@@ -120,7 +120,7 @@ def _uv_of(floor: bpy.types.Object, place: Array, near: float) -> Array:
         at: list[Any] = [Vector(vertex) for vertex in _in_world(floor, mesh_arrays.positions(mesh)).tolist()]
         mesh.calc_loop_triangles()
         triangles = [(tuple(each.vertices), tuple(each.loops)) for each in mesh.loop_triangles]
-        tree = BVHTree.FromPolygons(at, [of_vertices for of_vertices, _ in triangles])
+        tree: Any = BVHTree.FromPolygons(at, [of_vertices for of_vertices, _ in triangles])
         for number, point in enumerate(place.tolist()):
             on, _, triangle, _ = tree.find_nearest(point, near)
             if on is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+from typing import Any
 
 import bpy
 import gpu
@@ -12,7 +13,7 @@ from ...core.errors import SoftGroundError
 from .. import settings
 from ..command_line import program
 from ..ground import baked_ground, ground_mesh
-from ..operator_base import Checked
+from ..operator_base import Checked, OperatorResult
 from ..operators.bake_result import warnings_of
 
 MANUAL = program.PACKAGE / "manual"
@@ -75,7 +76,7 @@ class SOFTGROUND_OT_open_manual(Checked):
     def missing(cls, _context: bpy.types.Context) -> str:
         return "" if MANUAL.is_dir() else "The sources have no manual: read docs/, or install the package"
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> OperatorResult:
         bpy.ops.wm.url_open(url=(MANUAL / "index.html").as_uri())
         return {"FINISHED"}
 
@@ -88,7 +89,7 @@ class SOFTGROUND_OT_report_bug(bpy.types.Operator):
     bl_idname = "softground.report_bug"
     bl_label = "Report a Bug"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> OperatorResult:
         context.window_manager.clipboard = bug_report(settings.scene_of(context))
         self.report({"INFO"}, "Copied the details: paste them into your report, below what you did and what happened")
         website = program.about().get("website")
@@ -133,22 +134,23 @@ class SOFTGROUND_OT_tell_where(bpy.types.Operator):
     bl_label = "Where SoftGround Is"
     bl_options = {"INTERNAL"}
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> OperatorResult:
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, _context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    def modal(self, _context: bpy.types.Context, _event: bpy.types.Event) -> OperatorResult:
         self.report({"INFO"}, WHERE)  # which is seen only of operators that events have run
         return {"FINISHED", "PASS_THROUGH"}
 
 
 def _tell_where() -> None:
     """Tell it once: the preferences, which go as the add-on is disabled, know if it was told."""
-    ours, windows = bpy.context.preferences.addons.get(settings.ADD_ON), bpy.context.window_manager.windows
+    ours: Any = bpy.context.preferences.addons.get(settings.ADD_ON)
+    windows = bpy.context.window_manager.windows
     if ours and windows and not ours.preferences.was_told:
         ours.preferences.was_told = True
         with bpy.context.temp_override(window=windows[0]):
-            bpy.ops.softground.tell_where("INVOKE_DEFAULT")
+            bpy.ops.softground.tell_where("INVOKE_DEFAULT")  # type: ignore[attr-defined]
 
 
 def register() -> None:

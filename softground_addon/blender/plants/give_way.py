@@ -11,6 +11,7 @@ import numpy as np
 from ...core.plants.bending import PLANTS
 from .. import compat, mesh_arrays
 from ..nodes.node_modifiers import named_by_nodes, nodes_of, set_inputs
+from ..rigs.object_data import mesh_of
 from . import give_way_nodes as nodes
 from .trampling_table import TRAMPLED_ON, modifier_of, plants_of
 
@@ -96,7 +97,7 @@ def _follows(obj: bpy.types.Object, grounds: Collection[bpy.types.Object]) -> bo
         return True
     on_surface = getattr(obj.data, "surface", None) in grounds
     for modifier in obj.modifiers:
-        if modifier.type != "NODES" or modifier.node_group is None:
+        if not isinstance(modifier, bpy.types.NodesModifier) or modifier.node_group is None:
             continue
         named = [*named_by_nodes(modifier), *(value for _, value in compat.node_inputs(modifier))]
         deforms = any(node.bl_idname == "GeometryNodeDeformCurvesOnSurface" for node in nodes_of(modifier))
@@ -112,7 +113,8 @@ def _instances_of(objects: Sequence[bpy.types.Object]) -> dict[bpy.types.Object,
     for instance in graph.object_instances:
         if instance.is_instance and instance.parent and instance.parent.original in heights:
             shape = instance.instance_object
-            top = max((corner[2] for corner in shape.bound_box), default=0.0) if shape.type in _SHAPES else 0.0
+            corners = shape.bound_box if shape and shape.type in _SHAPES else ()
+            top = max((corner[2] for corner in corners), default=0.0)
             heights[instance.parent.original].append(top * instance.matrix_world.to_scale().z)
     return heights
 
@@ -123,7 +125,7 @@ def _height_of(obj: bpy.types.Object, instances: Sequence[float]) -> float:
         return float(np.percentile(instances, _TALL))
     scale = obj.matrix_world.to_scale().z
     if obj.type == "MESH":
-        up = mesh_arrays.positions(cast("bpy.types.Mesh", obj.data))[:, 2]
+        up = mesh_arrays.positions(mesh_of(obj))[:, 2]
         return scale * float(np.ptp(up)) if len(up) else 0.0
     curves: Any = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     if not len(curves.curves):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 import bpy
 import numpy as np
@@ -69,11 +70,11 @@ def _curves(places: Array, thickness: float) -> bpy.types.Curves:
     """Hair curves through places (N, K, 3), pointed at their ends."""
     curves = bpy.data.hair_curves.new(NAME)
     curves.add_curves([places.shape[1]] * len(places))
-    position = curves.attributes["position"].data
-    position.foreach_set("vector", places.astype(np.float32).ravel())
+    attribute: Any = curves.attributes["position"]
+    attribute.data.foreach_set("vector", places.astype(np.float32).ravel())
     thin = np.tile(0.5 * thickness * np.linspace(1.0, 0.1, places.shape[1]), len(places))
-    radius = curves.attributes.new("radius", "FLOAT", "POINT").data
-    radius.foreach_set("value", thin.astype(np.float32))
+    attribute = curves.attributes.new("radius", "FLOAT", "POINT")
+    attribute.data.foreach_set("value", thin.astype(np.float32))
     curves.materials.append(_material())
     return curves
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -15,6 +15,7 @@ from .. import compat, mesh_arrays
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import inputs_of, modifier_with, set_inputs
 from ..placement import hang_on
+from ..rigs.object_data import mesh_of
 from . import give_way_nodes as nodes
 from . import trampling_layout as layout
 
@@ -44,7 +45,7 @@ def ensure(ground: bpy.types.Object) -> bpy.types.Object:
 def is_current(ground: bpy.types.Object) -> bool:
     """True if a ground has a table, and what is in it is of this version."""
     table = of(ground)
-    return table is not None and table.data.get(layout.MARK) == layout.VERSION
+    return table is not None and mesh_of(table).get(layout.MARK) == layout.VERSION
 
 
 def is_idle(ground: bpy.types.Object) -> bool:
@@ -82,7 +83,7 @@ def clear(ground: bpy.types.Object) -> None:
         _exchange(table, bpy.data.meshes.new(NAME))
         return
     ground.pop(TRAMPLED, None)
-    vertices = cast("bpy.types.Mesh", table.data)
+    vertices = mesh_of(table)
     bpy.data.objects.remove(table)
     bpy.data.meshes.remove(vertices)
 

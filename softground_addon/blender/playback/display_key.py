@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
+
+from ..rigs.object_data import mesh_of
 
 Positions = NDArray[np.float32]
 """Of all vertices, (V, 3) in the object's own space and units."""
@@ -20,23 +22,24 @@ MOST_VERTICES = 250_000
 
 def is_dense(ground: bpy.types.Object) -> bool:
     """True if shape keys would make a ground play slower."""
-    return len(ground.data.vertices) > MOST_VERTICES
+    return len(mesh_of(ground).vertices) > MOST_VERTICES
 
 
 def put(ground: bpy.types.Object, raw: Positions, display: Positions) -> None:
     """Raw positions as the basis, and above it the key that shows the blurred ones, as it may be there already."""
-    mesh = cast("bpy.types.Mesh", ground.data)
+    mesh = mesh_of(ground)
     if not mesh.shape_keys:
         ground.shape_key_add(name="Basis", from_mix=False)
-    if DISPLAY_KEY not in mesh.shape_keys.key_blocks:
+    keys: Any = mesh.shape_keys
+    if DISPLAY_KEY not in keys.key_blocks:
         ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
     _move_basis(mesh, raw)
-    mesh.shape_keys.key_blocks[DISPLAY_KEY].points.foreach_set("co", display.ravel())
+    keys.key_blocks[DISPLAY_KEY].points.foreach_set("co", display.ravel())
 
 
 def take_off(ground: bpy.types.Object, basis: Positions) -> None:
     """Leave no shape keys but those that the user has made since, on a basis of these positions."""
-    mesh = cast("bpy.types.Mesh", ground.data)
+    mesh = mesh_of(ground)
     if not mesh.shape_keys:
         return
     if shown := mesh.shape_keys.key_blocks.get(DISPLAY_KEY):
@@ -66,10 +69,11 @@ def drop_all(mesh: bpy.types.Mesh) -> None:
 
 def _move_basis(mesh: bpy.types.Mesh, basis: Positions) -> None:
     """Give the first key other positions; the user's keys keep what they add to it."""
-    first = mesh.shape_keys.reference_key
+    keys: Any = mesh.shape_keys
+    first = keys.reference_key
     change = basis - _read(first)
     first.points.foreach_set("co", basis.ravel())
-    for key in mesh.shape_keys.key_blocks:
+    for key in keys.key_blocks:
         if key.name not in (first.name, DISPLAY_KEY):
             key.points.foreach_set("co", (_read(key) + change).ravel())
 

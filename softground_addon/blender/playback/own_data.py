@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import bpy
 
+from ..rigs.object_data import mesh_of
 from .playback_nodes import AGE, COMPRESSION, OF_PLAYBACK, REST, RIM
 from .weather_nodes import OF_WEATHER, WATER
 
@@ -47,7 +48,7 @@ def _noted(mesh: bpy.types.Mesh) -> Sequence[str]:
 
 def users_own(ground: bpy.types.Object) -> list[str]:
     """Names on a ground that a bake would need for itself, and the user has taken."""
-    mesh = cast("bpy.types.Mesh", ground.data)
+    mesh = mesh_of(ground)
     ours = made(mesh)
     present = {*mesh.attributes.keys(), *ground.vertex_groups.keys()}  # which may not be called alike
     attributes = [name for name in ATTRIBUTES if name in present and name not in ours]

@@ -17,6 +17,7 @@ from .. import mesh_arrays
 from ..compat import straighten
 from ..drafts import none_left_if_it_fails
 from ..nodes.node_modifiers import modifier_with, put, showing
+from ..rigs.object_data import mesh_of
 from ..settings import find, name_of, resolve
 from . import own_data
 from . import playback_nodes as nodes
@@ -69,7 +70,7 @@ def attach(
         World up in the ground's own space and units, of the length of one metre.
     """
     remove(ground)
-    mesh = cast("bpy.types.Mesh", ground.data)
+    mesh = mesh_of(ground)
     _write_attributes(mesh, vertices, spans)
     group = nodes.build(
         table=table,
@@ -97,10 +98,9 @@ def barrier_on(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     return next((modifier for modifier in ground.modifiers if modifier.type in NEED_THE_MESH), None)
 
 
-def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
+def modifier_of(ground: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """The ground's playback, whatever the names of the modifier and its node group have become."""
-    modifier: bpy.types.Modifier | None = modifier_with(ground, nodes.is_playback)
-    return modifier
+    return modifier_with(ground, nodes.is_playback)
 
 
 def playing(ground: bpy.types.Object) -> list[tuple[bpy.types.Object, Any]]:
@@ -113,12 +113,12 @@ def remove(ground: bpy.types.Object) -> None:
     for shown, _ in playing(ground):
         _stop(shown)
     remove_unused()
-    own_data.remove(cast("bpy.types.Mesh", ground.data), own_data.OF_PLAYBACK)
+    own_data.remove(mesh_of(ground), own_data.OF_PLAYBACK)
 
 
 def hand_over(source: bpy.types.Object, target: bpy.types.Object) -> None:
     """Have an object play what another one plays, under the name of what it played; its mesh is left alone."""
-    new, old = modifier_of(source), modifier_of(target)
+    new, old = cast("Any", (modifier_of(source), modifier_of(target)))
     name = old.node_group.name if old else ""
     _stop(target)
     remove_unused()

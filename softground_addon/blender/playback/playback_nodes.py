@@ -120,8 +120,8 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     """The object whose splines a group samples."""
     for node in tree.nodes:
         if node.bl_idname == "GeometryNodeObjectInfo":
-            table: bpy.types.Object | None = node.inputs["Object"].default_value
-            return table
+            socket: Any = node.inputs["Object"]
+            return socket.default_value
     return None
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import bpy
 
 from .. import compat
 from ..nodes import node_modifiers
+from ..rigs.object_data import mesh_of
 from . import own_data, playback, weather_inputs, weather_table
 from . import weather_nodes as nodes
 
@@ -22,8 +23,7 @@ NAMES = frozenset(name for name, *_ in weather_inputs.INPUTS)
 
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     """The ground's weather, whatever the names of the modifier and its node group have become."""
-    modifier: bpy.types.Modifier | None = node_modifiers.modifier_with(ground, weather_inputs.is_weather)
-    return modifier
+    return node_modifiers.modifier_with(ground, weather_inputs.is_weather)
 
 
 def inputs_of(modifier: Any) -> dict[str, str]:
@@ -58,7 +58,7 @@ def remove(ground: bpy.types.Object) -> None:
         while modifier := modifier_of(shown):
             shown.modifiers.remove(modifier)
     remove_unused()
-    own_data.remove(cast("bpy.types.Mesh", ground.data), nodes.OF_WEATHER)
+    own_data.remove(mesh_of(ground), nodes.OF_WEATHER)
 
 
 def remove_unused() -> None:
@@ -110,7 +110,7 @@ def led_values(modifier: Any, frame: float) -> dict[str, float]:
     """Values of the inputs of a modifier that follow weather, at a frame of the animation, by name."""
     values = {}
     for name, curve in _followers(modifier).items():
-        ground: Any = curve.driver.variables[0].targets[0].id
+        ground: Any = curve.driver and curve.driver.variables[0].targets[0].id
         if weather := ground and modifier_of(ground):
             keyed = node_modifiers.curves_of(weather).get(name)
             values[name] = keyed.evaluate(frame) if keyed else compat.read_input(weather, inputs_of(weather)[name])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.ground.surfaces import Soaking
 from ...core.weather.weather import Matter, Span
 from ...core.weather.weather_course import Weather, steady_table
+from ..rigs.object_data import mesh_of
 from .weather_course_nodes import AGES, HOLLOWS, PER_FRAME, SUMMED, TABLE, THREES, UNITS, field_of, tabled
 
 NAME = "SoftGround Weather Table"
@@ -40,21 +41,21 @@ def separate(tree: Any, name: str) -> None:
     """Give one of a group's nodes a table of its own."""
     if table := named(tree, name):
         copy = tree.nodes[name].inputs["Object"].default_value = table.copy()
-        copy.data = table.data.copy()
+        copy.data = mesh_of(table).copy()
 
 
 def remove_unused(tables: Iterable[bpy.types.Object | None]) -> None:
     """Remove those of some tables that nothing looks up any more."""
     for table in tables:
         if table is not None and not table.users:
-            mesh = cast("bpy.types.Mesh", table.data)
+            mesh = mesh_of(table)
             bpy.data.objects.remove(table)
             bpy.data.meshes.remove(mesh)
 
 
 def fill(table: bpy.types.Object, columns: Mapping[str, NDArray[np.float64]]) -> None:
     """Have a table hold some columns, each (rows, 3)."""
-    mesh = cast("bpy.types.Mesh", table.data)
+    mesh = mesh_of(table)
     rows = len(next(iter(columns.values())))
     if len(mesh.vertices) != rows:
         mesh.clear_geometry()

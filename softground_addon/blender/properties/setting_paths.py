@@ -59,7 +59,7 @@ def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:
     owner: Any = settings
     steps = _parse(path)
     if steps[0] == SLOTS and len(steps) == 2:
-        ground_slots.choose(settings.ground, steps[1], text)
+        ground_slots.choose(owner.ground, steps[1], text)
         return
     for step in steps[:-1]:
         owner = _descend(owner, step, path)
@@ -110,7 +110,7 @@ def _choices(owner: Any) -> str:
     return "There are: " + ", ".join(key for key in properties.keys() if key not in ("rna_type", "name")) + "."  # noqa: SIM118
 
 
-def _value(setting: bpy.types.Property, text: str, path: str) -> Any:
+def _value(setting: Any, text: str, path: str) -> Any:
     kind = setting.type
     if kind in ("FLOAT", "INT"):
         try:

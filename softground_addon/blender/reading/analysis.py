@@ -262,7 +262,7 @@ def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
     moves, which is compared by hash."""
     if mover_of(ground):
         return []
-    return [tuple(row) for row in ground_surface.placed_by_parents(ground) or ground.matrix_world]
+    return [tuple(row[:]) for row in (ground_surface.placed_by_parents(ground) or ground.matrix_world)[:]]
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:

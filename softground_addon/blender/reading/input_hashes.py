@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Collection, Container, Iterable, Iterator
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -14,6 +14,7 @@ from ..animation_layer.constraint_layer import is_response
 from ..animation_layer.layer_curves import animated_paths
 from ..compat import action_curves, node_inputs, slot_of
 from ..ground import ground_mesh
+from ..rigs.object_data import mesh_of, pose_bones
 
 _CHANNELS = (
     "location",
@@ -88,7 +89,7 @@ def of_envelope(bone: bpy.types.Bone) -> str:
 def of_shapes(obj: bpy.types.Object) -> str:
     """Hash of the deformers of a skin other than bones: shape keys and modifiers; empty without any."""
     texts = [text for modifier in obj.modifiers if modifier.type != "ARMATURE" for text in of_settings(modifier)]
-    keys = obj.data.shape_keys
+    keys = mesh_of(obj).shape_keys
     if keys is not None:
         keyed = animated_paths_of(keys)
         for block in keys.key_blocks:
@@ -229,7 +230,7 @@ def _of_block(block: bpy.types.ID, known: Known) -> str:
         elif isinstance(block, bpy.types.NodeTree):
             parts = [*_of_nodes(block, known)]
         else:
-            parts = [block.bl_rna.identifier, bpy.path.basename(getattr(block, "filepath", ""))]
+            parts = [cast("Any", block.bl_rna).identifier, bpy.path.basename(getattr(block, "filepath", ""))]
         known[block] = joined(parts)
     return known[block]
 
@@ -324,7 +325,7 @@ def _of_bones(obj: bpy.types.Object) -> Iterator[str]:
         armature.bones.foreach_get(part, values)
         yield f"{zlib.crc32(values.data):08x}"
     animated = animated_paths(obj)
-    for bone in obj.pose.bones:
+    for bone in pose_bones(obj):
         path = bone.path_from_id()
         pose = [
             value

@@ -18,6 +18,7 @@ from ...core.numerics.rigid import carried
 from ...core.rig.mapping import RigMapping
 from ...core.settings import CharacterSettings, ObjectName
 from ..animation_layer.layer_curves import LayerCurve, path_of_bone
+from ..rigs.object_data import armature_of
 from ..rigs.rest_pose import legs_of_feet, legs_on_shins
 from ..sampling.rig_checks import check_bones
 from ..sampling.rig_sampling import RigPoses
@@ -68,7 +69,7 @@ def mapping_with_legs(character: CharacterSettings) -> RigMapping:
 
 
 def _with_parents(armature: bpy.types.Object, bone: str) -> set[str]:
-    at_rest = armature.data.bones.get(bone)
+    at_rest = armature_of(armature).bones.get(bone)
     return {bone, *(parent.name for parent in at_rest.parent_recursive)} if at_rest else {bone}
 
 
@@ -161,7 +162,7 @@ def _bone_curves(
     root_control = moved.get(control.carried_by)
     if root_control is None:
         root_control = np.broadcast_to(np.eye(4), pose.shape)
-    elif not armature.data.bones[control.bone].use_inherit_rotation:
+    elif not armature_of(armature).bones[control.bone].use_inherit_rotation:
         root_control = _translation_at(root_control, pose[:, :3, 3])
     change = np.linalg.inv(root_control @ pose) @ moved[control.part] @ pose
     size = float(np.linalg.norm(poses.world[0, :3, 0])) * metre

@@ -17,6 +17,7 @@ from ...core.motion.people import leg_sides
 from ...core.rig.mapping import RigMapping
 from ..animation_layer.constraint_layer import is_own
 from ..animation_layer.layer_curves import animated_paths
+from ..rigs.object_data import pose_bones
 from ..rigs.rig_mapping import CHOOSE_CONTACTS
 
 _FOLLOWED = 0.5
@@ -167,10 +168,10 @@ class _Rig:
 
     def __init__(self, armature: bpy.types.Object, evaluated: bpy.types.Object) -> None:
         self.armature, self.name = armature, armature.name
-        self._bones: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in armature.pose.bones}
-        self._evaluated: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in evaluated.pose.bones}
+        self._bones: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in pose_bones(armature)}
+        self._evaluated: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in pose_bones(evaluated)}
         self.keyed = {path.split('"')[1] for path, _ in animated_paths(armature) if path.startswith('pose.bones["')}
-        self._shapes = any(bone.custom_shape for bone in armature.pose.bones)
+        self._shapes = any(bone.custom_shape for bone in pose_bones(armature))
 
     def behind(self, bone: str) -> Iterator[str]:
         """The bone, then all that it follows, nearest first."""

@@ -10,6 +10,7 @@ import numpy as np
 from ...core.numerics.arrays import Array
 from ..animation_layer.layer_curves import animated_paths
 from ..placement import world_matrix
+from .object_data import armature_of
 
 Carried = tuple[str, Array]
 """A bone, and the place of what it carries in the space of its armature at rest, (4, 4)."""
@@ -41,7 +42,7 @@ def held_with(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.typ
 def _hung(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     """The bone on which an object itself hangs, or that it follows."""
     if obj.parent == armature and obj.parent_type == "BONE":
-        bone = armature.data.bones.get(obj.parent_bone)
+        bone = armature_of(armature).bones.get(obj.parent_bone)
         return (bone.name, _on_bone(obj, bone)) if bone else None
     return _held(obj, armature) if _active(obj) and not _is_keyed(obj) else None
 
@@ -66,7 +67,7 @@ def _held(obj: bpy.types.Object, armature: bpy.types.Object) -> Carried | None:
     target: Any = each
     if each.type == "ARMATURE":
         target = each.targets[0] if len(each.targets) == 1 else None
-    bone = armature.data.bones.get(getattr(target, "subtarget", ""))
+    bone = armature_of(armature).bones.get(getattr(target, "subtarget", ""))
     if others or each.influence < FULL or bone is None or target.target != armature:
         return None
     if each.type == "COPY_TRANSFORMS" and each.mix_mode == "REPLACE":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import ceil, floor, inf
-from typing import Any
+from typing import Any, cast
 
 import bpy
 
@@ -99,7 +99,7 @@ def holds_a_pose(obj: bpy.types.Object) -> bool:
         curve
         for node in (obj, *ancestors(obj))
         if (animation := node.animation_data)
-        for owner in (animation, *(strip for track in animation.nla_tracks for strip in track.strips))
+        for owner in cast("Any", (animation, *(strip for track in animation.nla_tracks for strip in track.strips)))
         if owner.action
         for curve in action_curves(owner.action, slot_of(owner))
     ]

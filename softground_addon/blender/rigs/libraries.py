@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import bpy
 
@@ -33,4 +33,4 @@ def _parts_of(obj: bpy.types.Object) -> Iterator[bpy.types.ID]:
         yield obj.data
     if obj.animation_data:
         strips = (strip for track in obj.animation_data.nla_tracks for strip in track.strips)
-        yield from filter(None, (owner.action for owner in (obj.animation_data, *strips)))
+        yield from filter(None, (owner.action for owner in cast("Any", (obj.animation_data, *strips))))

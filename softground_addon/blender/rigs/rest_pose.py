@@ -18,6 +18,7 @@ from ...core.motion.ground_frame import upright
 from ...core.numerics.arrays import Array
 from ..placement import felt_gravity
 from ..settings import gravity_direction_of
+from .object_data import armature_of, pose_bones
 
 Joints = dict[str, tuple[str, str]]
 Feet = list[tuple[str, str, str, str]]
@@ -238,7 +239,7 @@ def _neck_joints(skeleton: _Skeleton, neck: Sequence[int]) -> Joints:
 
 def _read_skeleton(armature: bpy.types.Object, *, posed: bool = False) -> _Skeleton:
     """The deforming bones in world axes, at rest or posed, each hung from its nearest ancestor that deforms."""
-    bones = list(armature.data.bones)
+    bones = list(armature_of(armature).bones)
     deforming = [bone for bone in bones if bone.use_deform] or bones
     index = {bone.name: place for place, bone in enumerate(deforming)}
     parents = [next((index[p.name] for p in bone.parent_recursive if p.name in index), -1) for bone in deforming]
@@ -250,7 +251,7 @@ def _read_skeleton(armature: bpy.types.Object, *, posed: bool = False) -> _Skele
     names = [bone.name for bone in deforming]
     ends = [(bone.head_local, bone.tail_local) for bone in deforming]
     if posed:
-        ends = [(bone.head, bone.tail) for bone in map(armature.pose.bones.__getitem__, names)]
+        ends = [(bone.head, bone.tail) for bone in map(pose_bones(armature).__getitem__, names)]
     heads, tails = np.moveaxis(np.array(ends), 1, 0) @ turn.T
     return _Skeleton(names, parents, heads, tails, posed)
 

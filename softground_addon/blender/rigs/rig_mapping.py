@@ -16,6 +16,7 @@ from ...core.rig.bones import RestBone, RigBones
 from ...core.rig.mapping import BoneEnd, RigMapping, SoleSource
 from ...core.rig.name_mapping import map_by_names
 from .libraries import check_libraries
+from .object_data import armature_of
 from .rest_pose import map_by_rest_pose
 
 CHOOSE_CONTACTS = (
@@ -49,7 +50,7 @@ def map_rig(armature: bpy.types.Object, *, posed: bool = False, named: bool = Tr
         If the object is no armature, or no feet are found by name or by rest pose.
     """
     require_armature(armature)
-    deforming = {bone.name for bone in armature.data.bones if bone.use_deform}
+    deforming = {bone.name for bone in armature_of(armature).bones if bone.use_deform}
     mapping = map_by_names(rest_bones(armature), deforming) if named else None
     if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
         shape = map_by_rest_pose(armature, posed=posed, skinned=skinned)
@@ -164,7 +165,7 @@ def require_armature(armature: bpy.types.Object | None) -> None:
             f"'{armature.name}' is not an armature but of type {armature.type.title()}: select the character's "
             "armature."
         )
-    if not armature.data.bones:
+    if not armature_of(armature).bones:
         raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")
 
 
@@ -180,5 +181,5 @@ def rest_bones(armature: bpy.types.Object) -> RigBones:
                 np.linalg.norm(np.array(bone.tail_local, dtype=float) - np.array(bone.head_local, dtype=float))
             ),
         )
-        for bone in armature.data.bones
+        for bone in armature_of(armature).bones
     }

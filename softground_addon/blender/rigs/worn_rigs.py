@@ -13,6 +13,7 @@ from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
 from .carried import Carried, carrier_of
+from .object_data import armature_of, pose_bones
 
 Lead = tuple[bpy.types.Object, str]
 """An armature and a bone of it that others follow."""
@@ -48,7 +49,7 @@ def _is_below(extent: Array, low: Array, high: Array) -> bool:
 
 def _extent(rig: bpy.types.Object) -> Array:
     """Lowest and highest corner of a rig's bones in the world, (2, 3)."""
-    ends = np.array([np.array(rig.matrix_world @ end) for bone in rig.pose.bones for end in (bone.head, bone.tail)])
+    ends = np.array([np.array(rig.matrix_world @ end) for bone in pose_bones(rig) for end in (bone.head, bone.tail)])
     return np.stack([ends.min(axis=0), ends.max(axis=0)]) if len(ends) else np.zeros((2, 3))
 
 
@@ -58,7 +59,7 @@ def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> Carried | None:
     for leader in dict.fromkeys(leader for leader, _ in leads):
         bone, place = carrier_of(rig, leader) or ("", np.eye(4))
         if name := leads.get((leader, bone)):
-            lies = body.data.bones[name].matrix_local @ leader.data.bones[bone].matrix_local.inverted()
+            lies = armature_of(body).bones[name].matrix_local @ armature_of(leader).bones[bone].matrix_local.inverted()
             return name, np.asarray(np.array(lies) @ place)
     return None
 
@@ -70,7 +71,7 @@ def _wears(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
     if animation and (animation.action or any(track.strips for track in animation.nla_tracks)):
         return False
     leads = _leads(body, rig)
-    led = [bone for bone in rig.pose.bones if any(lead in leads for _, lead in _followed(bone))]
+    led = [bone for bone in pose_bones(rig) if any(lead in leads for _, lead in _followed(bone))]
     # A body of its own whose animation is retargeted copies rotations, or reaches for places.
     return bool(led) and all(_held(bone, leads) for bone in led)
 
@@ -78,9 +79,9 @@ def _wears(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
 def _leads(body: bpy.types.Object, rig: bpy.types.Object) -> dict[Lead, str]:
     """The bone of a body that goes where each of some bones goes, its own and, of the larger of two rigs that follow
     the same one, those that it follows."""
-    leads = {(body, bone.name): bone.name for bone in body.data.bones}
-    if (len(body.data.bones), body.name) > (len(rig.data.bones), rig.name):
-        for bone in body.pose.bones:
+    leads = {(body, bone.name): bone.name for bone in armature_of(body).bones}
+    if (len(armature_of(body).bones), body.name) > (len(armature_of(rig).bones), rig.name):
+        for bone in pose_bones(body):
             leads |= {lead: bone.name for kind, lead in _followed(bone) if kind in _COPIES and lead[0] != rig}
     return leads
 
@@ -91,9 +92,10 @@ def _followed(bone: bpy.types.PoseBone) -> Iterator[tuple[str, Lead]]:
         if constraint.mute or constraint.influence < _FULL or is_own(constraint):
             continue
         each: Any = constraint
+        rig: Any = bone.id_data
         for target in each.targets if constraint.type == "ARMATURE" else [each]:
             leader, name = getattr(target, "target", None), getattr(target, "subtarget", "")
-            if leader and name and (each.owner_space == "WORLD" or leader.matrix_world == bone.id_data.matrix_world):
+            if leader and name and (each.owner_space == "WORLD" or leader.matrix_world == rig.matrix_world):
                 yield constraint.type, (leader, name)
 
 
@@ -110,11 +112,11 @@ def carriers(rig: bpy.types.Object, body: bpy.types.Object) -> dict[str, Carried
     """
     leads, carrying = _leads(body, rig), {}
     in_body = beside(rig, body)
-    for bone in rig.pose.bones:
+    for bone in pose_bones(rig):
         for node in (bone, *bone.parent_recursive):
             if (held := _held(node, leads)) is not None:
                 kind, name = held[0], leads[held[1]]
-                lies = body.data.bones[name].matrix_local @ node.bone.matrix_local.inverted()
+                lies = armature_of(body).bones[name].matrix_local @ node.bone.matrix_local.inverted()
                 carrying[bone.name] = name, np.array(lies) if kind in _COPIES else in_body
                 break
     return carrying

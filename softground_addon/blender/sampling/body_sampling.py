@@ -22,11 +22,11 @@ from .. import mesh_arrays
 from ..placement import units_about, world_matrix
 from ..rigs.frame_ranges import frames_with_shapes
 from ..rigs.libraries import check_libraries
+from ..rigs.object_data import mesh_of
 from ..rigs.rig_mapping import parts_of
 from ..settings import resolve, timeline_of
 from .rig_checks import check_frames, check_mass
 from .sampling_scene import depsgraph_at, object_named, sampling_scene
-from .skin_sampling import mesh_of
 from .take import Take
 
 POSES = 24
@@ -48,7 +48,7 @@ def deforms(obj: bpy.types.Object) -> bool:
     """True if shape keys over time or a mesh cache move the vertices of a mesh that no armature does."""
     if obj.type != "MESH" or obj.find_armature():
         return False
-    keys = obj.data.shape_keys
+    keys = mesh_of(obj).shape_keys
     return bool(keys and keys.animation_data) or any(m.type in _CACHES and m.show_viewport for m in obj.modifiers)
 
 

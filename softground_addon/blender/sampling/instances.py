@@ -25,16 +25,16 @@ def instancers(scene: bpy.types.Scene, shown: Collection[bpy.types.Object]) -> d
     waiting = {obj.name for obj in scene.objects if not _drawn_on(obj, of_groups).isdisjoint(shown)}
     if not waiting:
         return {}
-    names, showing = {obj.data.name_full: obj.name for obj in shown}, {}
+    names, showing = {obj.data.name_full: obj.name for obj in shown if obj.data}, {}
     scene.view_layers[0].update()
     depsgraph = scene.view_layers[0].depsgraph
     for instance in islice(depsgraph.object_instances if depsgraph else (), MOST_LOOKED_AT):
-        if not (instance.is_instance and instance.parent.name in waiting):
+        parent = instance.parent
+        if not (instance.is_instance and parent and parent.name in waiting):
             continue
-        data = instance.object.data
-        if data is not None and data.name_full in names:  # a copy when it is evaluated, of the same name
-            showing[instance.parent.name] = names[data.name_full]
-            waiting.remove(instance.parent.name)
+        if (obj := instance.object) and obj.data and obj.data.name_full in names:  # evaluated, a copy of the same name
+            showing[parent.name] = names[obj.data.name_full]
+            waiting.remove(parent.name)
     return showing
 
 
@@ -45,7 +45,7 @@ def _drawn_on(obj: bpy.types.Object, of_groups: dict[Any, list[Any]]) -> set[bpy
     for system in obj.particle_systems:
         given += (system.settings.instance_object, system.settings.instance_collection)
     for modifier in obj.modifiers:
-        if modifier.type == "NODES" and (group := modifier.node_group):
+        if isinstance(modifier, bpy.types.NodesModifier) and (group := modifier.node_group):
             if group not in of_groups:
                 of_groups[group] = list(named_by_nodes(modifier))
             given += (*of_groups[group], *(value for _, value in node_inputs(modifier)))

@@ -20,6 +20,7 @@ from ...core.numerics.rigid import rotation, unit
 from ..animation_layer.constraint_layer import is_own
 from ..animation_layer.layer_curves import path_of_bone
 from ..compat import HAS_SLOTS, action_curves, slot_of
+from ..rigs.object_data import armature_of, pose_bones
 
 _NO_SIMPLE_CHANNEL = re.compile(r'(.*\.)?rotation_mode|delta_.*|pose\.bones\[[^"].*')
 """Animated paths that mean more than the value of a channel, or name a bone in a way of their own."""
@@ -32,14 +33,14 @@ def is_moved_by_keys_alone(armature: bpy.types.Object, bones: Iterable[str]) -> 
     bones that take over a part of their parent's motion only.
     """
     animation = armature.animation_data
-    if animation is None or armature.parent or armature.data.animation_data:
+    if animation is None or armature.parent or armature_of(armature).animation_data:
         return False
     if animation.drivers or not _plays_its_action_only(animation) or _has_deltas(armature):
         return False
-    constraints = (constraint for owner in (armature, *armature.pose.bones) for constraint in owner.constraints)
+    constraints = (constraint for owner in (armature, *pose_bones(armature)) for constraint in owner.constraints)
     if any(not (constraint.mute and is_own(constraint)) for constraint in constraints):
         return False
-    if not all(_follows_its_parent(armature.data.bones[name]) for name in with_parents(armature, bones)):
+    if not all(_follows_its_parent(armature_of(armature).bones[name]) for name in with_parents(armature, bones)):
         return False
     curves = _curves(animation)
     if any(curve.group and curve.group.mute for curve in curves):  # which some Blenders heed
@@ -51,7 +52,7 @@ def with_parents(armature: bpy.types.Object, bones: Iterable[str]) -> list[str]:
     """Names of bones and of all above them, parents first."""
     names_in_order: dict[str, None] = {}
     for name in bones:
-        bone = armature.data.bones[name]
+        bone = armature_of(armature).bones[name]
         names_in_order.update(dict.fromkeys([each.name for each in (*reversed(bone.parent_recursive), bone)]))
     return list(names_in_order)
 
@@ -75,13 +76,13 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
     (F, 4, 4) float array
         Matrices of the bone in the armature's space [Blender units].
     """
-    bone = armature.data.bones[name]
-    local = _transforms(armature.pose.bones[name], path_of_bone(name, ""), times)
+    bone = armature_of(armature).bones[name]
+    local = _transforms(pose_bones(armature)[name], path_of_bone(name, ""), times)
     if bone.use_connect:
         local[:, :3, 3] = 0.0
     if bone.parent is None:
         return np.asarray(np.array(bone.matrix_local) @ local)
-    return np.asarray(parent @ _from_parent(bone) @ local)
+    return np.asarray(parent @ _from_parent(bone, bone.parent) @ local)
 
 
 def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
@@ -126,11 +127,11 @@ def _curves(animation: bpy.types.AnimData) -> list[bpy.types.FCurve]:
     ]
 
 
-def _from_parent(bone: bpy.types.Bone) -> Array:
+def _from_parent(bone: bpy.types.Bone, parent: bpy.types.Bone) -> Array:
     """Matrix from the bone's space to its parent's, at rest."""
     matrix = np.array(bone.matrix.to_4x4())
     matrix[:3, 3] = bone.head
-    matrix[1, 3] += bone.parent.length  # heads count from the parent's tail
+    matrix[1, 3] += parent.length  # heads count from the parent's tail
     return matrix
 
 
@@ -139,7 +140,8 @@ def _transforms(obj: bpy.types.Object | bpy.types.PoseBone, path: str, times: Ar
 
     The object's curves have its channels at `path`; those that no curve animates stay as they are.
     """
-    curves = [curve for curve in _curves(obj.id_data.animation_data) if curve.data_path.startswith(path)]
+    owner: Any = obj.id_data
+    curves = [curve for curve in _curves(owner.animation_data) if curve.data_path.startswith(path)]
     channel = partial(_channel, obj, curves, path, times)
     result = np.zeros((len(times), 4, 4))
     with np.errstate(invalid="ignore"):  # of broken keys

@@ -11,6 +11,7 @@ from ...core.errors import InputError
 from ...core.rig.mapping import RigMapping, bones_of
 from ...core.rig.recording import Recording
 from ..animation_layer.constraint_layer import is_own
+from ..rigs.object_data import armature_of
 from ..rigs.rig_mapping import CHOOSE_CONTACTS, require_armature
 from ..settings import Objects
 from .prop_extraction import check_props
@@ -54,7 +55,7 @@ def check_rig(objects: Objects, armature: bpy.types.Object, mapping: RigMapping,
     check_bones(armature, mapping)
     if armature.mode == "EDIT":
         raise InputError(f"Armature '{name}' is in Edit Mode and stands still: leave it with Tab first.")
-    if armature.data.pose_position == "REST":
+    if armature_of(armature).pose_position == "REST":
         raise InputError(f"Armature '{name}' shows its rest position: set it to Pose Position in its data properties.")
     if not is_animated(armature):
         raise InputError(f"Armature '{name}' has no animation: give it an action, or choose the armature that has one.")
@@ -62,7 +63,7 @@ def check_rig(objects: Objects, armature: bpy.types.Object, mapping: RigMapping,
 
 def check_bones(armature: bpy.types.Object, mapping: RigMapping) -> None:
     """Raise InputError where an armature has no bone of a name that its mapping has."""
-    missing = [bone for bone in bones_of(mapping) if bone not in armature.data.bones]
+    missing = [bone for bone in bones_of(mapping) if bone not in armature_of(armature).bones]
     if missing:
         raise InputError(
             f"Armature '{armature.name}' has no bone '{missing[0]}': choose the bones of the character again."
@@ -76,11 +77,11 @@ def is_animated(armature: bpy.types.Object) -> bool:
         animation = obj.animation_data
         if animation and (animation.action or animation.drivers or any(track.strips for track in animation.nla_tracks)):
             return True
-        owners = (obj, *(obj.pose.bones if obj.type == "ARMATURE" else ()))
+        owners = (obj, *(obj.pose.bones if obj.pose else ()))
         if any(not is_own(constraint) for owner in owners for constraint in owner.constraints):
             return True
         obj = obj.parent
-    return bool(armature.data.animation_data)
+    return bool(armature.data and armature.data.animation_data)
 
 
 def check_finite(name: str, recording: Recording) -> None:

@@ -15,6 +15,7 @@ from ...core.rig.recording import Recording
 from ..animation_layer.constraint_layer import without_layers
 from ..placement import world_matrix
 from ..rigs.frame_ranges import held_range
+from ..rigs.object_data import armature_of, mesh_of, pose_bones
 from ..settings import timeline_of
 from .frame_handlers import handled_finding, let_handlers_act, moving_handlers
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
@@ -83,7 +84,7 @@ def _read_keys(take: Take, armature: str, bones: Sequence[str]) -> Generator[int
     poses = np.empty((len(frames), len(chain), 4, 4), dtype=np.float32)
     for done, name in enumerate(chain):
         obj = object_named(armature)
-        above = obj.data.bones[name].parent
+        above = armature_of(obj).bones[name].parent
         parent = np.swapaxes(poses[:, chain.index(above.name) if above else done], -1, -2)
         with without_layers(obj, below):
             poses[:, done] = np.swapaxes(keyed_pose(obj, name, times, parent), -1, -2)
@@ -134,7 +135,7 @@ def _evaluate(
                 if armature:
                     evaluated = object_named(armature).evaluated_get(depsgraph)
                     armature_matrices[done] = placed(evaluated)
-                    pose = evaluated.pose.bones
+                    pose = pose_bones(evaluated)
                     if done == 0:
                         places = [pose.find(bone) for bone in bones]
                         buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
@@ -143,8 +144,8 @@ def _evaluate(
             for place, obj in enumerate(props):
                 prop_matrices[done, place] = placed(object_named(obj).evaluated_get(depsgraph))
             for place, (obj, key) in enumerate(shapes):
-                keys = object_named(obj).data.shape_keys.evaluated_get(depsgraph)
-                values[place, done] = keys.key_blocks[key].value
+                keys: Any = mesh_of(object_named(obj)).shape_keys
+                values[place, done] = keys.evaluated_get(depsgraph).key_blocks[key].value
             yield done + 1
     yield len(frames)
 
@@ -185,7 +186,7 @@ def _moved_by_handlers(
                     let_handlers_act(still_there(name), frame)
                 depsgraph = depsgraph_at(name, frame)
                 at = [object_named(obj).evaluated_get(depsgraph) for obj in objects]
-                poses = (at[0].pose.bones[bone].matrix for bone in bones)
+                poses = (pose_bones(at[0])[bone].matrix for bone in bones)
                 seen.append(np.array([*(obj.matrix_world for obj in at), *poses]))
             yield 0
             if not np.allclose(seen[0], seen[1], rtol=1e-5, atol=1e-5, equal_nan=True):

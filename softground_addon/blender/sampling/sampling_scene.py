@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any, cast
 
 import bpy
 
 from ...core.errors import InputError
 from ..compat import remove_scene
+from ..rigs.object_data import mesh_of
 from .frame_handlers import handlers_silent, let_handlers_act
 
 TEMPORARY = "SoftGround Sampling"
@@ -62,13 +64,13 @@ def sampling_scene(
                 setattr(temporary.render, setting, getattr(scene.render, setting))
             of_vertices = ((obj, "any vertices") for obj in meshes)  # depends on the mesh, if no group has that name
             for obj, bone in (*((armature, bone) for bone in bones), *((obj, "") for obj in props), *of_vertices):
-                dependence = probe.constraints.new("COPY_LOCATION")
+                dependence: Any = probe.constraints.new("COPY_LOCATION")
                 dependence.target, dependence.subtarget = object_named(obj), bone
             for obj, key in shapes:
-                driver = probe.driver_add("location", 0).driver
+                driver = cast("Any", probe.driver_add("location", 0)).driver
                 driver.type = "SUM"
                 follows = driver.variables.new().targets[0]
-                follows.id_type, follows.id = "KEY", object_named(obj).data.shape_keys
+                follows.id_type, follows.id = "KEY", mesh_of(object_named(obj)).shape_keys
                 follows.data_path = follows.id.key_blocks[key].path_from_id("value")
             temporary.collection.objects.link(probe)
             yield names[0]

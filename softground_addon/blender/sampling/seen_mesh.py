@@ -13,6 +13,7 @@ import numpy as np
 from ...core.rig.rig_skin import Shape
 from .. import mesh_arrays
 from ..animation_layer.layer_curves import animated_paths
+from ..rigs.object_data import mesh_of
 from ..settings import ObjectName, find, name_of
 from .frame_handlers import handlers_silent
 from .sampling_scene import temporary_scene
@@ -37,7 +38,7 @@ _WITHOUT_SHAPE = {"ARMATURE", "COLLISION", "DYNAMIC_PAINT", "PARTICLE_INSTANCE",
 def left_out(obj: bpy.types.Object) -> list[str]:
     """What changes the shape of a skin and is not read."""
     modifiers = (modifier for modifier in obj.modifiers if modifier.show_viewport and modifier.type in _AFTER_BONES)
-    keys = obj.data.shape_keys
+    keys = mesh_of(obj).shape_keys
     by_time = ["the keyed time of its shape keys"] * bool(keys and not keys.use_relative and keys.animation_data)
     return [*(f"the modifier '{modifier.name}'" for modifier in modifiers), *by_time]
 
@@ -49,13 +50,13 @@ def as_seen(obj: bpy.types.Object) -> Iterator[tuple[ObjectName, tuple[Shape, ..
     Where shape keys or modifiers have a part in it, it is a copy that is gone afterwards; keyed shapes are at 0 in it.
     """
     shown = {modifier.type for modifier in obj.modifiers if modifier.show_viewport}
-    if not (obj.data.shape_keys or shown - _AFTER_BONES - _WITHOUT_SHAPE):
+    if not (mesh_of(obj).shape_keys or shown - _AFTER_BONES - _WITHOUT_SHAPE):
         yield name_of(obj), ()
         return
     copy = obj.copy()
     name, meshes = name_of(copy), []
     try:
-        copy.data = obj.data.copy()
+        copy.data = mesh_of(obj).copy()
         meshes.append(copy.data.name)
         copy.data, shapes = _evaluated(copy, obj)
         meshes.append(copy.data.name)
@@ -70,14 +71,14 @@ def as_seen(obj: bpy.types.Object) -> Iterator[tuple[ObjectName, tuple[Shape, ..
 def _evaluated(copy: bpy.types.Object, obj: bpy.types.Object) -> tuple[bpy.types.Mesh, tuple[Shape, ...]]:
     """The mesh that modifiers make of a copy of an object and of its mesh, and what each keyed shape adds to it."""
     copy.hide_viewport = False
-    most = int(log(max(_MOST_FACES / max(len(obj.data.polygons), 1), 1), 4))
+    most = int(log(max(_MOST_FACES / max(len(mesh_of(obj).polygons), 1), 1), 4))
     for modifier in list(copy.modifiers):
         if modifier.type in _AFTER_BONES | _WITHOUT_SHAPE:
             copy.modifiers.remove(modifier)
-        elif modifier.type in ("SUBSURF", "MULTIRES"):
+        elif isinstance(modifier, bpy.types.SubsurfModifier | bpy.types.MultiresModifier):
             modifier.levels = min(modifier.levels, most)
-    keyed = _keyed_shapes(obj.data.shape_keys)
-    keys = copy.data.shape_keys
+    keyed = _keyed_shapes(mesh_of(obj).shape_keys)
+    keys: Any = mesh_of(copy).shape_keys
     if keyed:
         keys.animation_data_clear()
     for name in keyed:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -19,6 +18,7 @@ from .. import mesh_arrays
 from ..placement import beside
 from ..rigs.carried import carrier_of
 from ..rigs.libraries import check_libraries
+from ..rigs.object_data import armature_of, mesh_of
 from ..rigs.worn_rigs import carriers, hung_on, worn_rigs
 from ..settings import ObjectName, Objects, name_of, resolve
 from .seen_mesh import as_seen, left_out
@@ -152,7 +152,7 @@ class _Piece:
 
 def _shod(pieces: list[_Piece], armature: bpy.types.Object) -> list[_Piece]:
     """Meshes, where what hangs below bones of the skin, and lower than all that is deformed, is no prop, but shoes."""
-    up, bones = np.array(armature.matrix_world)[2, :3], armature.data.bones
+    up, bones = np.array(armature.matrix_world)[2, :3], armature_of(armature).bones
     heights = [piece.vertices @ up if len(piece.vertices) else np.full(1, np.inf) for piece in pieces]
     deformed = np.concatenate([[], *(height for height, piece in zip(heights, pieces, strict=True) if not piece.hung)])
     deformed = deformed[np.isfinite(deformed)]
@@ -166,13 +166,6 @@ def _shod(pieces: list[_Piece], armature: bpy.types.Object) -> list[_Piece]:
         return piece.hung and bool(not below or height.min() > low or height.max() > top)
 
     return [replace(piece, hung=is_prop(piece, height)) for height, piece in zip(heights, pieces, strict=True)]
-
-
-def mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
-    """The mesh of a mesh object."""
-    mesh = obj.data
-    assert isinstance(mesh, bpy.types.Mesh), obj.name
-    return mesh
 
 
 def _hung(obj: bpy.types.Object, armature: bpy.types.Object, shapes: tuple[Shape, ...]) -> _Piece:
@@ -223,7 +216,7 @@ def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, r
     """A mesh of that name where the object `placed` is."""
     vertex, group, weight = yield from _weights(name)
     obj, armature = resolve(name), resolve(rig)
-    mesh, bones = mesh_of(obj), armature.data.bones
+    mesh, bones = mesh_of(obj), armature_of(armature).bones
     count = len(mesh.vertices)
     names = tuple(group.name for group in obj.vertex_groups)
     if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
@@ -254,12 +247,11 @@ def enveloping(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.ty
     """The bones of an armature whose envelopes move what no vertex group holds of a mesh."""
     by_parent = obj.parent == armature and obj.parent_type == "ARMATURE"
     deforms = any([modifier.use_bone_envelopes for modifier in _modifiers(obj, armature)] or [by_parent])
-    return [bone for bone in armature.data.bones if bone.use_deform and deforms]
+    return [bone for bone in armature_of(armature).bones if bone.use_deform and deforms]
 
 
 def _modifiers(obj: bpy.types.Object, armature: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    deforming: list[Any] = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]
-    return deforming
+    return [m for m in obj.modifiers if isinstance(m, bpy.types.ArmatureModifier) and m.object == armature]
 
 
 def _with_envelopes(

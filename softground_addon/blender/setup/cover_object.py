@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import bpy
 import numpy as np
 from bpy.props import FloatProperty
@@ -81,7 +83,7 @@ class SOFTGROUND_OT_cover(Act):
 @none_left_if_it_fails()
 def _object_of(laid: covers.Cover, name: str, unit: float, thickness: float) -> bpy.types.Object:
     """A cover as an object that is in no scene yet; its layer is painted as deep as it is."""
-    depth = SoftGroundPainted.bl_rna.properties["layer_depth"].default
+    depth = cast("Any", SoftGroundPainted.bl_rna.properties["layer_depth"]).default
     mesh = mesh_arrays.points(name, laid.vertices / unit, [(depth, "FLOAT", laid.thickness / thickness)])
     mesh.loops.add(laid.faces.size)
     mesh.loops.foreach_set("vertex_index", laid.faces.astype(np.int32).ravel())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from math import pi, radians
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import bpy
 from mathutils import Vector
@@ -13,6 +13,7 @@ from mathutils import Vector
 from .. import compat, settings
 from ..operator_base import Act
 from ..operators import show_prints
+from ..rigs.object_data import armature_of
 
 FILE = Path(__file__).with_name("sample_walk.json")
 """Bones, mesh and keys of the figure in plain numbers; `sample_scenes.sample_walk` writes it."""
@@ -47,7 +48,7 @@ def add_walking_figure(context: bpy.types.Context) -> bpy.types.Object:
     for collection in armature.users_collection:
         collection.objects.link(figure)
     figure.parent = armature
-    figure.modifiers.new("Armature", "ARMATURE").object = armature
+    cast("Any", figure.modifiers.new("Armature", "ARMATURE")).object = armature
     _make_action(armature, data["curves"])
     return armature
 
@@ -55,7 +56,7 @@ def add_walking_figure(context: bpy.types.Context) -> bpy.types.Object:
 def _make_bones(armature: bpy.types.Object, bones: list[Any]) -> None:
     bpy.ops.object.mode_set(mode="EDIT")
     try:
-        edit_bones = armature.data.edit_bones
+        edit_bones = armature_of(armature).edit_bones
         for name, parent, head, tail in bones:
             bone = edit_bones.new(name)
             bone.head, bone.tail = head, tail
@@ -130,8 +131,8 @@ def add_light_and_camera(context: bpy.types.Context, armature: bpy.types.Object)
     """A low sun, where there is none, and a camera on the last steps, for a scene without one or a new file."""
     scene = settings.scene_of(context)
     place = armature.location + LAST_STEPS
-    if not any(obj.type == "LIGHT" and obj.data.type == "SUN" for obj in scene.objects):
-        sun = bpy.data.lights.new("Walking Figure Sun", "SUN")
+    if not any(isinstance(obj.data, bpy.types.SunLight) for obj in scene.objects):
+        sun: Any = bpy.data.lights.new("Walking Figure Sun", "SUN")
         sun.energy, sun.angle, sun.color = SUN, radians(0.5), (1.0, 0.87, 0.72)
         _link(armature, sun).rotation_euler = (pi / 2 - SUN_HEIGHT, 0.0, LOOK + SUN_ASIDE - pi / 2)
     camera = _link(armature, bpy.data.cameras.new("Walking Figure Camera"))

@@ -175,7 +175,7 @@ def draw_line(points: Array, colour: Colour, width: float) -> None:
     from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
 
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    viewport: Any = gpu.state.viewport_get()
+    viewport: Any = gpu.state.viewport_get()  # type: ignore[func-returns-value]
     shader.uniform_float("viewportSize", viewport[2:])
     shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
     shader.uniform_float("color", colour)
@@ -265,10 +265,10 @@ def read_again() -> float | None:
     windows = bpy.context.window_manager.windows
     if not session.current().show_overlay or not windows:
         return None
-    if not bpy.ops.softground.read_again.poll():
+    if not bpy.ops.softground.read_again.poll():  # type: ignore[attr-defined]
         return PATIENCE
     with bpy.context.temp_override(window=windows[0]):
-        bpy.ops.softground.read_again("INVOKE_DEFAULT")
+        bpy.ops.softground.read_again("INVOKE_DEFAULT")  # type: ignore[attr-defined]
     return None
 
 

@@ -18,7 +18,7 @@ from ...core.record.edits import FARTHEST, StepEdit
 from .. import jobs, session, settings
 from ..baking import step_edits
 from ..ground import baked_ground, baked_steps
-from ..operator_base import Checked
+from ..operator_base import Checked, OperatorResult
 from ..placement import from_scene, in_scene
 from ..remedies import said
 from ..state import state
@@ -74,19 +74,19 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
     bl_idname = "softground.drag_step"
     bl_label = "Drag in Viewport"
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Use Drag in Viewport in a 3D viewport")
             return {"CANCELLED"}
         self._drag: _Drag | None = None
         state.picking = True
-        manager: Any = context.window_manager
-        manager.modal_handler_add(self)
-        context.workspace.status_text_set(translated(_HINT))
+        context.window_manager.modal_handler_add(self)
+        if context.workspace:
+            context.workspace.status_text_set(translated(_HINT))
         _redraw()
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         try:
             return self._handle(context, event)
         except SoftGroundError as error:
@@ -99,7 +99,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
     def cancel(self, context: bpy.types.Context) -> None:
         self._leave(context, {"CANCELLED"})
 
-    def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         if event.type in ("ESC", "RIGHTMOUSE"):
             return self._leave(context, {"CANCELLED"})
         region, view = _viewport(context, None if state.box else event)
@@ -114,7 +114,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
             return self._drop(context)
         return {"RUNNING_MODAL"}
 
-    def _pick(self, context: bpy.types.Context, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
+    def _pick(self, context: bpy.types.Context, event: bpy.types.Event, region: Any, view: Any) -> OperatorResult:
         """Outline the print under the mouse, and take hold of it at a click."""
         scene = settings.scene_of(context)
         if state.box:
@@ -143,7 +143,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
 
-    def _box(self, ground: bpy.types.Object, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
+    def _box(self, ground: bpy.types.Object, event: bpy.types.Event, region: Any, view: Any) -> OperatorResult:
         """Follow the mouse with a box, and choose the steps whose middles are in it as the button is let go."""
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
         state.box = [state.box[0], (min(max(x, 0), region.width), min(max(y, 0), region.height))]
@@ -174,22 +174,23 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
                 drag.is_slow = len(drag.steps) > 1 and time.thread_time() - start > SLOW
             _redraw()
 
-    def _drop(self, context: bpy.types.Context) -> set[str]:
+    def _drop(self, context: bpy.types.Context) -> OperatorResult:
         assert self._drag is not None
         edits = self._drag.edits(self._drag.edit) if self._drag.edit != self._drag.step.edit else {}
         self._leave(context, set())
         if edits:
             state.edits = edits
-            bpy.ops.softground.drop_steps("INVOKE_DEFAULT")
+            bpy.ops.softground.drop_steps("INVOKE_DEFAULT")  # type: ignore[attr-defined]
         return {"FINISHED" if edits else "CANCELLED"}
 
-    def _leave(self, context: bpy.types.Context, result: set[str]) -> set[str]:
+    def _leave(self, context: bpy.types.Context, result: OperatorResult) -> OperatorResult:
         """Show the ground as it was, and nothing of ours."""
         if self._drag is not None:
             self._drag.preview.end()
             self._drag = None
         state.picking, state.under, state.edits, state.box = False, "", {}, ()
-        context.workspace.status_text_set(None)
+        if context.workspace:
+            context.workspace.status_text_set(None)
         _redraw()
         return result
 
@@ -219,9 +220,9 @@ def _redraw() -> None:
 def _viewport(context: bpy.types.Context, event: bpy.types.Event | None) -> tuple[Any, Any]:
     """The viewport's region, and how it looks at the scene; None where the mouse of an event is over another region."""
     area: Any = context.area
-    for region in area.regions if area and event else ():
-        inside = 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
-        if region.type != "WINDOW" and inside:
+    for region in area.regions if area else ():
+        over = event and 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
+        if region.type != "WINDOW" and over:
             return None, None
     region = next((item for item in area.regions if item.type == "WINDOW"), None) if area else None
     return (region, area.spaces.active.region_3d) if region else (None, None)

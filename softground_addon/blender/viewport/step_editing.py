@@ -29,7 +29,7 @@ from .. import jobs, session, settings
 from ..baking import step_edits, step_soles
 from ..ground import baked_ground, baked_steps
 from ..live import live
-from ..operator_base import Checked, OnBake
+from ..operator_base import Checked, OnBake, OperatorResult
 from ..operators import show_prints
 from ..operators.modal_job import STAGE_NAMES, ModalJob
 from ..placement import from_scene
@@ -140,11 +140,11 @@ class SOFTGROUND_OT_choose_step(OnBake, Checked):
     step: StringProperty(name="Step", description="Id of the step", options={"HIDDEN"})
     extend: BoolProperty(name="Extend", description="Add it to the selection, or remove it", options={"HIDDEN"})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         self.extend = event.shift
         return self.execute(context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> OperatorResult:
         scene = settings.scene_of(context)
         step = next((item for item in baked_steps.of(scene.softground.ground) if item.name == self.step), None)
         if step is None:
@@ -246,10 +246,10 @@ class SOFTGROUND_OT_change_step(OnStep, EditJob):
         self._in_dialog = True
         return context.window_manager.invoke_props_dialog(self)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> OperatorResult:
         run = self._start if self._in_dialog else super().execute  # which Adjust Last Operation calls
         self._in_dialog = False
-        result: set[str] = run(context)
+        result: OperatorResult = run(context)
         return result
 
     def wanted(self, ground: bpy.types.Object) -> Wanted:
@@ -317,7 +317,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
 
     sole: _sole_property()
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         self.sole = ""  # that of the step, and not what was chosen for the one before
         return super().invoke(context, event)
 
