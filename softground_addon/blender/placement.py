@@ -41,7 +41,17 @@ def world_matrix(obj: bpy.types.Object) -> Array:
 
 
 def beside(obj: bpy.types.Object, other: bpy.types.Object) -> Array:
-    """Space of an object to that of another one, (4, 4), also where Blender's own matrices round."""
+    """Space of an object to that of another one, (4, 4), also where Blender's own matrices round.
+
+    Of an object below the other it does not depend on where they are.
+    """
+    within, node = np.eye(4), obj
+    while node.parent and node.parent_type in ("OBJECT", "ARMATURE") and not (node.constraints or node.rigid_body):
+        within, node = np.array(node.matrix_parent_inverse) @ np.array(node.matrix_basis) @ within, node.parent
+        if node == other:
+            return np.asarray(within)
+        if node.type == "CURVE":  # along which it may go
+            break
     place = world_matrix(other)
     if np.abs(place[:3, 3]).max() <= FAR:
         return np.array(other.matrix_world.inverted_safe() @ obj.matrix_world)

@@ -30,7 +30,7 @@ def forget() -> None:
 
 
 def reused(
-    progress: State, kind: str, inputs: object, work: Generator[State, None, Result], *, of: str = ""
+    progress: State, kind: str, inputs: object, work: Generator[State, None, Result], *, of: str | None = ""
 ) -> Generator[State, None, Result]:
     """The last result of a kind if its inputs were equal, otherwise that of the work.
 
@@ -42,10 +42,12 @@ def reused(
         All that the result depends on; `hash_inputs` compares it.
     work : generator
         Not begun where a result is taken over.
-    of : str
-        Name of one of several of a kind, of which each has its last result.
+    of : str or None
+        Name of one of several of a kind, of which each has its last result; None where all that have equal inputs share
+        one, which is small.
     """
     compared = yield from meanwhile(progress, hash_inputs.slices(inputs))
+    of = compared if of is None else of
     if last := state.results.get((kind, of)):
         if last[0] == compared:
             result: Result = last[1]
@@ -59,9 +61,9 @@ def reused(
 
 
 def _size(*values: Any) -> int:
-    """Approximate memory of values [bytes]; what they share counts once."""
+    """Approximate memory of values [bytes], of those that are too large at least; what they share counts once."""
     waiting, seen, size = list(values), set[int](), 0
-    while waiting:
+    while waiting and size <= LARGEST:
         value = waiting.pop()
         if id(value) in seen or isinstance(value, type):
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -85,3 +86,18 @@ def walker(
     coarse(scene)
     bpy.context.view_layer.objects.active = armature
     return armature
+
+
+def copies(rig: bpy.types.Object, places: Sequence[tuple[float, float, float, float]]) -> list[bpy.types.Object]:
+    """A rig and copies of it with the same meshes and action, at some places (x, y, z, heading) [m, rad]."""
+    parts, crowd = [obj for obj in rig.users_collection[0].objects if obj.parent == rig], [rig]
+    for _ in places[1:]:
+        crowd.append(other := rig.copy())
+        for each, parent in ((other, None), *((part.copy(), other) for part in parts)):
+            each.parent = parent
+            rig.users_collection[0].objects.link(each)
+            for modifier in each.modifiers:
+                modifier.object = other
+    for each, (x, y, z, heading) in zip(crowd, places, strict=True):
+        each.location, each.rotation_euler = (x, y, z), (0.0, 0.0, heading)
+    return crowd

@@ -248,6 +248,6 @@ def _rigs_below(objects: settings.Objects, wanted: BakeSettings) -> Iterator[Fin
     """Rigs that nobody added under a character that was."""
     bodies = [settings.resolve(character.armature) for character in wanted.characters if character.armature]
     for body in bodies:
-        if names := [rig.name for rig in rigs_below(objects, body) if rig not in bodies]:
+        if names := [rig.name for rig in rigs_below(objects, body, bodies)]:
             said = f"{listed(names)} stands under '{body.name}' and is no character: its feet do not print"
             yield Finding("rig_below", "warning", said, "add it, or join the two rigs of one body (Ctrl J).")

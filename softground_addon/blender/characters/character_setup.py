@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from math import ceil, floor, isclose
 from typing import Any
 
@@ -9,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.motion.motion import CharacterMotion
 from ...core.motion.sole_motion import shortest_length
 from ...core.motion.units import scale_to_metres
 from ...core.rig.bare_body import body_motion
@@ -17,10 +19,12 @@ from ...core.rig.recording import Timeline
 from .. import jobs
 from ..ground_presets import fit_cells, take_defaults
 from ..properties import SoftGroundCharacter
+from ..reuse import reused
 from ..rigs.frame_ranges import animated_frames
-from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature
+from ..rigs.rig_mapping import CHOOSE_CONTACTS, only_parts, parts_of, require_armature, rest_bones
 from ..sampling.body_sampling import body_frames
 from ..sampling.rig_sampling import recorded_motion, sample_character
+from ..sampling.skin_sampling import Weights
 from ..sampling.take import Take
 from ..settings import SIDE_TO_CODE, is_set_up, name_of, resolve, timeline_of
 from .import_fixes import extent_of, is_captured, mass_of, put_under, sizes_of
@@ -42,8 +46,10 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     return jobs.run(adding_character(scene, armature))
 
 
-def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> jobs.Job[SoftGroundCharacter]:
-    """Job of `add_character`; nothing is changed before the last.
+def adding_character(
+    scene: bpy.types.Scene, armature: bpy.types.Object | None, weights: dict[str, Weights] | None = None
+) -> jobs.Job[SoftGroundCharacter]:
+    """Job of `add_character`; nothing is changed before the last. `weights` are as for `read_skin`.
 
     Where no feet are found its list of soles is empty, for the user to fill.
     """
@@ -59,7 +65,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
             f"'{armature.name}' is already a character: correct its bones in Properties > Physics, or remove it first."
         )
     rig = name_of(armature)
-    recognised = yield from recognise(scene, armature, animated_frames(timeline_of(scene), armature))
+    recognised = yield from recognise(scene, armature, animated_frames(timeline_of(scene), armature), weights)
     length = yield from _shortest_sole(scene, resolve(rig), recognised)
     armature, mapping = resolve(rig), recognised.mapping
     known = free_name(settings.characters, armature.name)
@@ -123,16 +129,25 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
         return 0.0
     if recording is not None:
         poses = recording.of(np.arange(0, len(recording.frames), max(1, len(recording.frames) // _POSES)))
-        count = len(poses.frames)
         if recognised.body:
             reading = body_motion(armature.name, recognised.body, mapping, poses, mass=1.0)
         else:
             reading = recorded_motion(scene.view_layers[0], armature, mapping, poses, recognised.skin, mass=1.0)
-    else:
-        timeline = timeline_of(scene)
-        first, last = _frames_of_scene(timeline, animated_frames(timeline, armature))
-        frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
-        reading, count = sample_character(Take.about(armature, scene, frames), armature, mapping, mass=1.0), len(frames)
+        source = recognised.body or rest_bones(armature)
+        measured = source, mapping, poses, recognised.skin
+        measuring = _length_of(reading, mapping, len(poses.frames))
+        return (yield from reused(jobs.Progress("sample", SHARE), "sole length", measured, measuring, of=None))
+    timeline = timeline_of(scene)
+    first, last = _frames_of_scene(timeline, animated_frames(timeline, armature))
+    frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
+    reading = sample_character(Take.about(armature, scene, frames), armature, mapping, mass=1.0)
+    return (yield from _length_of(reading, mapping, len(frames)))
+
+
+def _length_of(
+    reading: Generator[int | None, None, CharacterMotion], mapping: RigMapping, count: int
+) -> jobs.Job[float]:
+    """Length of the shortest sole of a motion that is read from so many poses [m]; 0 if it cannot be."""
     try:
         motion = yield from jobs.counted(reading, "sample", count, share=SHARE)
     except InputError:  # it says so when the user bakes

@@ -21,12 +21,13 @@ from ...core.rig.skin_mass import skin_mass
 from ...core.rig.sole_extraction import bone_families
 from ...core.settings import ObjectName
 from .. import jobs
+from ..reuse import reused
 from ..rigs.object_data import armature_of
 from ..rigs.rig_mapping import map_rig, require_armature, rest_bones
 from ..sampling.body_sampling import POSES, body_frames, read_body, record_body
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import record
-from ..sampling.skin_sampling import read_skin
+from ..sampling.skin_sampling import Weights, read_skin
 from ..sampling.take import Take
 from ..settings import name_of, resolve, timeline_of
 
@@ -69,7 +70,10 @@ class Recognised:
 
 
 def recognise(
-    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None = None
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    frames: tuple[int, int] | None = None,
+    weights: dict[str, Weights] | None = None,
 ) -> jobs.Job[Recognised]:
     """Joints and contacts of a character.
 
@@ -77,6 +81,8 @@ def recognise(
     ----------
     frames : tuple of int, optional
         First and last frame of its animation.
+    weights : dict of str to Weights, optional
+        As for `read_skin`.
 
     Returns
     -------
@@ -94,7 +100,7 @@ def recognise(
         return Recognised(mapping)
     shaped = _mapped(armature, named=False) if mapping.method == "names" else mapping
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
-    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature))
+    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene.objects, armature, weights))
     armature = resolve(rig)
     if armature.mode == "EDIT":
         return Recognised(mapping)
@@ -109,16 +115,29 @@ def recognise(
     shapes = [shape.key for shape in skin.shapes]
     known = [*skin.bones, *bones_of(mapping), *bones_of(shaped)]
     reading = record(take, armature, known, shapes=shapes)
-    recording = yield from jobs.counted(reading, "sample", len(take.frames), share=SHARE)
-    bones = rest_bones(resolve(rig))
-    weighing = skin_mass.slices(skin, bones, recording)
-    mass = yield from jobs.meanwhile(read, weighing)
-    if not moves:
-        return Recognised(replace(mapping, mass=mass * _covers(bones, skin, mapping)), skin)
-    seen = yield from jobs.meanwhile(read, shown_by_skin.slices(bones, skin, recording))
-    agreeing = (may_be for may_be in (mapping, shaped) if _agrees(bones, may_be, shaped, seen))
-    joined = _joined(bones, skin, next(agreeing, RigMapping(method="skin")), seen)
-    return Recognised(replace(joined, mass=mass * _covers(bones, skin, joined)), skin, recording)
+    recording = (yield from jobs.counted(reading, "sample", len(take.frames), share=SHARE)).from_its_start()
+    shown = rest_bones(resolve(rig)), skin, recording, mapping, shaped, moves
+    mapping = yield from reused(read, "recognition", shown, _shown(*shown), of=None)
+    return Recognised(mapping, skin, recording if moves else None)
+
+
+def _shown(
+    bones: RigBones, skin: RigSkin, recording: Recording, mapping: RigMapping, shaped: RigMapping, moves: bool
+) -> jobs.Job[RigMapping]:
+    """The mapping of a character as its skin shows it, with its mass; that of its names if it stands still.
+
+    Parameters
+    ----------
+    mapping, shaped : RigMapping
+        By names and rest pose, and by the rest pose alone.
+    """
+    read = jobs.Progress("sample", SHARE)
+    mass = yield from jobs.meanwhile(read, skin_mass.slices(skin, bones, recording))
+    if moves:
+        seen = yield from jobs.meanwhile(read, shown_by_skin.slices(bones, skin, recording))
+        agreeing = (may_be for may_be in (mapping, shaped) if _agrees(bones, may_be, shaped, seen))
+        mapping = _joined(bones, skin, next(agreeing, RigMapping(method="skin")), seen)
+    return replace(mapping, mass=mass * _covers(bones, skin, mapping))
 
 
 def recognise_body(scene: bpy.types.Scene, name: ObjectName) -> jobs.Job[Recognised]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Any
 
 import bpy
@@ -11,12 +12,12 @@ from ...core.errors import InputError
 from .. import jobs
 from ..rigs.frame_ranges import ancestors, leaders
 from ..rigs.rig_mapping import instances_armature, parts_of, require_armature
-from ..rigs.worn_rigs import worn_rigs
+from ..rigs.worn_rigs import is_worn
 from ..sampling.body_sampling import deforms
 from ..sampling.instances import crowd_finding, instancers
 from ..sampling.rig_checks import is_animated
 from ..sampling.rig_recording import is_simulated
-from ..sampling.skin_sampling import meshes_on
+from ..sampling.skin_sampling import has_skin
 from ..settings import Objects
 from .character_setup import add_character, adding_body
 
@@ -36,7 +37,7 @@ def chosen(
     """
     picked = list(dict.fromkeys(obj for obj in (active, *selected) if obj is not None))
     known = {character.armature for character in scene.softground.characters}
-    rigs = list(dict.fromkeys(skin_rig(scene.objects, rig) for obj in picked for rig in _rigs_of(obj, known)))
+    rigs = _skin_rigs(scene.objects, [rig for obj in picked for rig in _rigs_of(obj, known)])
     if not rigs:
         _check_no_crowd(scene, picked)
     fresh = [rig for rig in rigs if rig not in known]
@@ -98,15 +99,20 @@ def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[b
     return [below for below in obj.children_recursive if below.type == "ARMATURE"]
 
 
-def skin_rig(objects: Objects, armature: bpy.types.Object) -> bpy.types.Object:
-    """The armature that moves the skin where another one controls it, or the body that wears it; itself if it does, or
+def _skin_rigs(objects: Objects, armatures: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The armatures that move the skin where others control it, or the bodies that wear it; each itself if it does, or
     none is found."""
-    if armature.type != "ARMATURE":
-        return armature
-    bodies = [obj for obj in objects if obj.type == "ARMATURE" and meshes_on(objects, obj)]
-    moving = [armature] if armature in bodies else [obj for obj in bodies if armature in all_leaders(obj)]
-    wearers = {next((body for body in bodies if rig in worn_rigs(objects, body)), rig) for rig in moving}
-    return wearers.pop() if len(wearers) == 1 else armature
+    bodies = [obj for obj in objects if obj.type == "ARMATURE" and has_skin(objects, obj)]
+    leaders_of = cache(all_leaders)
+
+    def skin_rig(armature: bpy.types.Object) -> bpy.types.Object:
+        if armature.type != "ARMATURE":
+            return armature
+        moving = [armature] if armature in bodies else [obj for obj in bodies if armature in leaders_of(obj)]
+        wearers = {next((body for body in bodies if is_worn(body, rig)), rig) for rig in moving}
+        return wearers.pop() if len(wearers) == 1 else armature
+
+    return list(dict.fromkeys(map(skin_rig, armatures)))
 
 
 def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
@@ -124,8 +130,8 @@ def all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
 def walkers_of(objects: Objects) -> list[bpy.types.Object]:
     """The armatures that move; where some of them move a skin, those."""
     moving = [obj for obj in objects if obj.type == "ARMATURE" and is_animated(obj)]
-    rigs = list(dict.fromkeys(skin_rig(objects, rig) for rig in moving))
-    return [rig for rig in rigs if meshes_on(objects, rig)] or rigs
+    rigs = _skin_rigs(objects, moving)
+    return [rig for rig in rigs if has_skin(objects, rig)] or rigs
 
 
 def set_up_automatically(scene: bpy.types.Scene) -> None:

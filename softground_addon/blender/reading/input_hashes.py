@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Container, Iterable, Iterator
-from typing import Any, cast
+from collections.abc import Callable, Collection, Container, Iterable, Iterator
+from typing import Any, TypeVar, cast
 
 import bpy
 import numpy as np
@@ -15,6 +15,8 @@ from ..animation_layer.layer_curves import animated_paths
 from ..compat import action_curves, node_inputs, slot_of
 from ..ground import ground_mesh
 from ..rigs.object_data import mesh_of, pose_bones
+
+Value = TypeVar("Value")
 
 _CHANNELS = (
     "location",
@@ -46,6 +48,9 @@ _NO_INPUT = frozenset(
 Known = dict[bpy.types.ID, str]
 """What data-blocks hold, as far as it was looked at: many bones follow the same objects."""
 
+Shared = dict[Any, Any]
+"""What was looked at of actions and meshes since the same call began: the figures of a crowd have the same."""
+
 _LOOKED_AT = 5000
 """Vertices whose weights are compared, spread over the mesh: Blender reads weights one by one."""
 
@@ -67,10 +72,14 @@ def of_positions(mesh: bpy.types.Mesh) -> str:
     return f"{zlib.crc32(rest.data):08x}"
 
 
-def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
+def of_weights(obj: bpy.types.Object, groups: Container[str], shared: Shared | None = None) -> str:
     """Weights of the vertices of a mesh in some of its vertex groups; of a large mesh, a sample of them."""
     numbers = {group.index: group.name for group in obj.vertex_groups if group.name in groups}
-    vertices = ground_mesh.mesh_of(obj).vertices
+    mesh = ground_mesh.mesh_of(obj)
+    return _once(shared, (mesh, *numbers.items()), lambda: _of_members(mesh.vertices, numbers))
+
+
+def _of_members(vertices: Any, numbers: dict[int, str]) -> str:
     looked_at = range(0, len(vertices), -(-len(vertices) // _LOOKED_AT)) if numbers and len(vertices) else ()
     return joined(
         f"{index} {numbers[member.group]} {member.weight:.6g}"
@@ -78,6 +87,16 @@ def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
         for member in vertices[index].groups
         if member.group in numbers
     )
+
+
+def _once(shared: Shared | None, key: Any, look: Callable[[], Value]) -> Value:
+    """What was looked at under a key, or is now."""
+    if shared is None:
+        return look()
+    if key not in shared:
+        shared[key] = look()
+    value: Value = shared[key]
+    return value
 
 
 def of_envelope(bone: bpy.types.Bone) -> str:
@@ -128,24 +147,29 @@ def of_place(objects: Iterable[bpy.types.Object]) -> str:
     return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
 
 
-def of_keys(obj: bpy.types.Object | bpy.types.Key) -> str:
+def of_keys(obj: bpy.types.Object | bpy.types.Key, shared: Shared | None = None) -> str:
     """The keys of the user's own actions and strips, and when they are played."""
     animation = obj.animation_data
     if animation is None:
         return ""
     hashes = set()
+
+    def of_action(owner: Any) -> str:
+        action, slot = owner.action, slot_of(owner)
+        return _once(shared, (action, slot, "keys"), lambda: _of_action(action, slot))
+
     if animation.action:
-        hashes.add(_of_action(animation.action, slot_of(animation)))
+        hashes.add(of_action(animation))
     for _, strip in _playing_strips(animation):
         if strip.action is None:
             continue
         influence = None if strip.use_animated_influence else strip.influence
         placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, influence)
-        hashes.add(f"{_of_action(strip.action, slot_of(strip))}@{placed}")
+        hashes.add(f"{of_action(strip)}@{placed}")
     return " ".join(sorted(hashes))
 
 
-def of_animation(obj: bpy.types.Object, known: Known) -> str:
+def of_animation(obj: bpy.types.Object, known: Known, shared: Shared | None = None) -> str:
     """Hash of what moves an object: curves, strips, drivers, constraints, physics and bones.
 
     Of data-blocks that it follows, `known` has what they hold, as far as it was looked at; they are added.
@@ -153,13 +177,18 @@ def of_animation(obj: bpy.types.Object, known: Known) -> str:
     animated = animated_paths_of(obj)
     parts: list[str] = [obj.rotation_mode]
     animation = obj.animation_data
+
+    def courses(owner: Any) -> set[str]:
+        action, slot = owner.action, slot_of(owner)
+        return _once(shared, (action, slot, "courses"), lambda: set(_of_curves(action_curves(action, slot))))
+
     if animation is not None:
         curves: set[str] = set()
         if animation.action:
-            curves.update(_of_curves(action_curves(animation.action, slot_of(animation))))
+            curves |= courses(animation)
         for track, strip in _playing_strips(animation):
             if strip.action:
-                curves.update(_of_curves(action_curves(strip.action, slot_of(strip))))
+                curves |= courses(strip)
             parts += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
         parts += sorted(curves)
         for driver in animation.drivers:

@@ -159,12 +159,12 @@ def of_movers(objects: settings.Objects, wanted: BakeSettings) -> dict[str, str]
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, the meshes that print, and what
     bears them beside the ground."""
     ground = settings.resolve(wanted.ground) if wanted.ground else None
-    movers = [obj for character in wanted.characters for obj in movers_of(character)]
+    movers, shared = [obj for character in wanted.characters for obj in movers_of(character)], input_hashes.Shared()
     return {
-        **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
+        **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover, shared) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
-        **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
-        **{f"{BODY}:{character.name}": _of_body(objects, character) for character in wanted.characters},
+        **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground, shared) for mover in movers},
+        **{f"{BODY}:{character.name}": _of_body(objects, character, shared) for character in wanted.characters},
         **{f"{HARD}:{name.name}": _of_hard(settings.resolve(name)) for name in wanted.hard_grounds},
         **({BESIDE: _of_others(wanted)} if wanted.grounds else {}),
     }
@@ -280,20 +280,22 @@ def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
     return input_hashes.joined([*parts, input_hashes.of_weights(ground, names)])
 
 
-def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
+def _of_movement(
+    mover: bpy.types.Object, ground: bpy.types.Object | None, shared: input_hashes.Shared | None = None
+) -> str:
     """Hash of what moves an object besides its keys and its parents: its rig, and all that it follows."""
     parents = ancestors(mover)
     known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
     # All of these are compared by themselves: here it counts only which is followed.
     blocks: input_hashes.Known = {obj: str(n) for n, obj in enumerate((mover, *parents, *([ground] if ground else ())))}
-    parts = [input_hashes.of_animation(mover, blocks)]
+    parts = [input_hashes.of_animation(mover, blocks, shared)]
     waiting = [*parents, *leaders(mover)]
     while waiting:
         obj = waiting.pop()
         if obj in known:
             continue
         known.add(obj)
-        parts += [input_hashes.of_keys(obj), input_hashes.of_animation(obj, blocks)]
+        parts += [input_hashes.of_keys(obj, shared), input_hashes.of_animation(obj, blocks, shared)]
         if obj not in parents:
             parts.append(input_hashes.of_place([obj]))
         waiting += [*([obj.parent] if obj.parent else []), *leaders(obj)]
@@ -326,7 +328,7 @@ def bodies_of(objects: settings.Objects, wanted: BakeSettings) -> list[bpy.types
     return [obj for character in wanted.characters for obj in (*_worn_by(objects, character), *_props_of(character))]
 
 
-def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
+def _of_body(objects: settings.Objects, character: CharacterSettings, shared: input_hashes.Shared | None = None) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     parts = []
@@ -342,12 +344,12 @@ def _of_body(objects: settings.Objects, character: CharacterSettings) -> str:
         texts = [text for each in held for text in input_hashes.of_settings(each, (), dict(known))]
         texts += [input_hashes.of_envelope(bone) for rig in rigs for bone in enveloping(worn, rig)]
         parts.append(
-            f"{_of_mesh(worn)} {nodes[-1].parent_bone} {input_hashes.of_weights(worn, bones)} "
+            f"{_of_mesh(worn)} {nodes[-1].parent_bone} {input_hashes.of_weights(worn, bones, shared)} "
             f"{input_hashes.of_place(nodes)}{input_hashes.of_shapes(worn)}{' '.join(texts)}"
         )
     for rig in rigs[1:]:
         nodes = held_with(rig, rigs[0]) or [rig]
-        parts.append(f"{input_hashes.of_animation(rig, {})} {input_hashes.of_place(nodes)}")
+        parts.append(f"{input_hashes.of_animation(rig, {}, shared)} {input_hashes.of_place(nodes)}")
     return input_hashes.joined(sorted(parts))
 
 

@@ -13,6 +13,7 @@ from ..animation_layer.constraint_layer import is_own
 from ..placement import beside
 from ..settings import Objects
 from .carried import Carried, carrier_of
+from .frame_ranges import ancestors
 from .object_data import armature_of, pose_bones
 
 Lead = tuple[bpy.types.Object, str]
@@ -31,15 +32,20 @@ _FULL = 0.5
 
 def worn_rigs(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object]:
     """The armatures that a body wears: they hang on its bones, or have no keys and go where its bones go."""
-    return [obj for obj in objects if obj.type == "ARMATURE" and obj != body and _wears(body, obj)]
+    return [obj for obj in objects if obj.type == "ARMATURE" and is_worn(body, obj)]
 
 
-def rigs_below(objects: Objects, body: bpy.types.Object) -> list[bpy.types.Object]:
-    """The armatures with a skin that stand under a body as it is now and move by themselves: legs with a rig of their
-    own, a horse."""
-    (low, high), worn = _extent(body), [rig for rig in worn_rigs(objects, body) if not rig.animation_data]
+def rigs_below(
+    objects: Objects, body: bpy.types.Object, known: Collection[bpy.types.Object] = ()
+) -> list[bpy.types.Object]:
+    """The armatures with a skin, but for those known, that stand under a body as it is now and move by themselves: legs
+    with a rig of their own, a horse."""
     skinned = dict.fromkeys(rig for obj in objects if obj.type == "MESH" and (rig := obj.find_armature()))
-    return [rig for rig in skinned if rig not in (body, *worn) and _is_below(_extent(rig), low, high)]
+    others = [rig for rig in skinned if rig != body and rig not in known]
+    if not others:
+        return []
+    (low, high), worn = _extent(body), [rig for rig in worn_rigs(objects, body) if not rig.animation_data]
+    return [rig for rig in others if rig not in worn and _is_below(_extent(rig), low, high)]
 
 
 def _is_below(extent: Array, low: Array, high: Array) -> bool:
@@ -55,6 +61,8 @@ def _extent(rig: bpy.types.Object) -> Array:
 
 def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> Carried | None:
     """The bone of a body on which a rig hangs as an object, and its place in the body's space at rest."""
+    if not any(node.parent_type == "BONE" or node.constraints for node in (rig, *ancestors(rig))):
+        return None  # as most rigs of a crowd
     leads = _leads(body, rig)
     for leader in dict.fromkeys(leader for leader, _ in leads):
         bone, place = carrier_of(rig, leader) or ("", np.eye(4))
@@ -64,7 +72,10 @@ def hung_on(rig: bpy.types.Object, body: bpy.types.Object) -> Carried | None:
     return None
 
 
-def _wears(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
+def is_worn(body: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    """True if a body wears an armature, as `worn_rigs` has it."""
+    if rig == body:
+        return False
     if hung_on(rig, body):
         return True
     animation = rig.animation_data

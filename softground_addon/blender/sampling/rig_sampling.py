@@ -30,7 +30,7 @@ from ..settings import name_of, resolve
 from .prop_extraction import check_props, read_prop
 from .rig_checks import check_frames, check_mass, check_recording, check_rig
 from .rig_recording import record, record_props
-from .skin_sampling import meshes_on, read_skin
+from .skin_sampling import has_skin, read_skin
 from .take import Take
 
 Sampling = Generator[int, None, CharacterMotion]
@@ -111,8 +111,8 @@ def sample_character(
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
-    if on_bones and meshes_on(objects, armature):
-        skin = yield from meanwhile(0, read_skin.slices(objects, armature))
+    if on_bones and has_skin(objects, armature):
+        skin = yield from meanwhile(0, read_skin.slices(objects, armature, take.weights))
     bones += skin.bones if skin and len(take.frames) <= MOST_SAMPLES else ()
     shapes = [shape.key for shape in skin.shapes] if skin else []
     recording = yield from record(take, resolve(rig), bones, props, shapes)

@@ -32,6 +32,9 @@ _LEAST_WEIGHT = 1e-4
 
 _STAND_INS = ("WIRE", "BOUNDS")
 
+Weights = tuple[Indices, Indices, Array]
+"""Vertex, vertex group and weight of every weight of a mesh, (N,) each."""
+
 
 def meshes_on(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
@@ -41,6 +44,11 @@ def meshes_on(objects: Objects, armature: bpy.types.Object) -> list[bpy.types.Ob
     """
     worn = _worn_by(objects, armature)
     return [obj for obj in worn if not obj.hide_render and obj.display_type not in _STAND_INS] or worn
+
+
+def has_skin(objects: Objects, armature: bpy.types.Object) -> bool:
+    """True if `meshes_on` an armature has any."""
+    return any(obj.type == "MESH" and _wears(armature, obj) for obj in objects)
 
 
 def hidden_on(objects: Objects, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
@@ -85,8 +93,15 @@ SHOD = 0.3
 
 
 @sliced
-def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | None]:
+def read_skin(
+    objects: Objects, armature: bpy.types.Object, weights: dict[str, Weights] | None = None
+) -> Slices[RigSkin | None]:
     """The meshes on an armature that `meshes_on` names, or None where there is none.
+
+    Parameters
+    ----------
+    weights : dict of str to Weights, optional
+        Takes the weights of meshes that several objects have, and gives them to the next.
 
     Raises
     ------
@@ -107,7 +122,8 @@ def read_skin(objects: Objects, armature: bpy.types.Object) -> Slices[RigSkin | 
             if _hangs(obj, armature):
                 pieces.append(_hung(resolve(seen), armature, shapes))
             else:
-                pieces.append((yield from _deformed(seen, shapes, name, rig)))
+                of_mesh = yield from _weights(seen, weights if seen == name else None)
+                pieces.append(_deformed(seen, shapes, name, rig, of_mesh))
         if rig != body:
             pieces[-1] = _carried(pieces[-1], resolve(rig), resolve(body))
         yield
@@ -212,9 +228,11 @@ def _carried(piece: _Piece, rig: bpy.types.Object, body: bpy.types.Object) -> _P
     )
 
 
-def _deformed(name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, rig: ObjectName) -> Slices[_Piece]:
+def _deformed(
+    name: ObjectName, shapes: tuple[Shape, ...], placed: ObjectName, rig: ObjectName, weights: Weights
+) -> _Piece:
     """A mesh of that name where the object `placed` is."""
-    vertex, group, weight = yield from _weights(name)
+    vertex, group, weight = weights
     obj, armature = resolve(name), resolve(rig)
     mesh, bones = mesh_of(obj), armature_of(armature).bones
     count = len(mesh.vertices)
@@ -267,8 +285,12 @@ def _with_envelopes(
     return vertex, group, weight
 
 
-def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
-    """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
+def _weights(name: ObjectName, weights: dict[str, Weights] | None) -> Slices[Weights]:
+    """The weights of a mesh, which can only be read one by one, from those of meshes that were read if it is shared."""
+    mesh = mesh_of(resolve(name))
+    shared = mesh.name_full if mesh.users > 1 else ""
+    if weights and shared in weights:
+        return weights[shared]
     read, tables = 0, [np.empty((0, 3))]
     while read < len(vertices := mesh_of(resolve(name)).vertices):
         piece = enumerate(vertices[read : read + _SLICE], read)
@@ -277,7 +299,10 @@ def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
         read += _SLICE
         yield
     table = np.concatenate(tables)
-    return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
+    of_mesh = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
+    if weights is not None and shared:
+        weights[shared] = of_mesh
+    return of_mesh
 
 
 def _moved(transform: Array, points: NDArray[np.float32]) -> Array:

@@ -12,6 +12,7 @@ from ...core.settings import ObjectName
 from ..animation_layer.constraint_layer import LayerKind
 from ..placement import units_about
 from ..settings import name_of, scene_named
+from .skin_sampling import Weights
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Take:
     """Frames of the user's scene of a name, which is only read.
 
     They are read in units that may have the frame of a ground, and without the add-on's layers from `below` on. The
-    findings take what the user should know of how that went.
+    findings take what the user should know of how that went, the weights those of meshes that several objects have.
     """
 
     name: ObjectName
@@ -27,6 +28,7 @@ class Take:
     units: SceneUnits
     below: LayerKind = LayerKind.RESPONSE
     findings: list[Finding] = field(default_factory=list)
+    weights: dict[str, Weights] = field(default_factory=dict)
 
     @classmethod
     def about(cls, obj: bpy.types.Object, scene: bpy.types.Scene, frames: range) -> Take:

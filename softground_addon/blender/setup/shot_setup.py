@@ -83,11 +83,12 @@ def _add(
 ) -> jobs.Job[Reports]:
     rigs, props = selection.chosen(scene, active, selected)
     reports: Reports = []
-    remaining = [settings.name_of(prop) for prop in props]
+    remaining, weights = [settings.name_of(prop) for prop in props], dict[str, skin_sampling.Weights]()
     for name in [settings.name_of(obj) for obj in (*rigs, *filter(body_sampling.deforms, props))]:
-        is_rig = name not in remaining
-        adding = character_setup.adding_character if is_rig else character_setup.adding_body
-        character = yield from adding(scene, settings.resolve(name))
+        if name in remaining:
+            character = yield from character_setup.adding_body(scene, settings.resolve(name))
+        else:
+            character = yield from character_setup.adding_character(scene, settings.resolve(name), weights)
         if character is None:  # it prints as a prop
             continue
         remaining = [prop for prop in remaining if prop != name]
@@ -98,7 +99,7 @@ def _add(
             if size > 0 and character.skin_mass > 0:  # one that is larger in its file than in life weighs tons
                 size_and_mass = {"name": character.name, "size": f"{size:.2g}", "mass": f"{character.mass:g}"}
                 reports.append(("INFO", translated("'{name}': {size} m in size, {mass} kg", **size_and_mass)))
-        elif rig_checks.is_animated(character.armature) and skin_sampling.meshes_on(scene.objects, character.armature):
+        elif rig_checks.is_animated(character.armature) and skin_sampling.has_skin(scene.objects, character.armature):
             what = "nothing of its skin rests on the ground, as of what swims or flies: it leaves no print. If it does"
             reports.append(("WARNING", f"Added '{character.name}', but {what}, {rig_mapping.CHOOSE_CONTACTS}"))
         else:

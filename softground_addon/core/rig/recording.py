@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 
 from ..motion.ground_frame import GroundFrame
 from ..numerics.arrays import Array
+from ..numerics.rigid import displacement, rotation
 
 _STILL = 1e-4
 """Poses that differ by less are one, over their largest entry."""
+
+
+_ALIKE = 2.0**-20
+"""Turns and places that differ by less may be one, over the armature's scale: Blender's own rounding."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,22 @@ class Recording:
             props={name: matrices[samples] for name, matrices in self.props.items()},
             shapes={key: values[samples] for key, values in self.shapes.items()},
         )
+
+    def from_its_start(self) -> Recording:
+        """The bones from frame 0, with the armature first at the origin and not turned about the vertical.
+
+        Its places are rounded, so that those of figures that do the same are equal, wherever and whenever they do.
+        Objects have none.
+        """
+        heading = np.arctan2(self.world[0, 1, 0], self.world[0, 0, 0])
+        world = displacement(rotation(np.array([0.0, 0.0, -heading])), self.world[0, :3, 3], np.zeros(3)) @ self.world
+        size = np.abs(world[0, :3, :3]).max()
+        if 0 < size < np.inf:
+            quantum = _ALIKE * 2.0 ** np.rint(np.log2(size))
+            world[:, :3] = np.rint(world[:, :3] / quantum) * quantum + 0.0  # none of them is -0
+        first = float(self.frames[0])
+        animated = self.animated and (self.animated[0] - first, self.animated[1] - first)
+        return replace(self, frames=self.frames - first, world=world, props={}, animated=animated)
 
     def in_frame(self) -> Recording:
         """The recording in the frame that it is solved in, rather than in the world's."""
