@@ -187,18 +187,18 @@ class CarvedGround:
 
         What is in the ground is drawn all the way, what only hovers over it at the end.
         """
-        moves, cell_size = around.take(part.vertices, axis=2), self.cell_size
-        if not part.step.is_deep or not np.isfinite(moves).all():
+        ends, cell_size = around[1:3].take(part.vertices, axis=2), self.cell_size
+        if not part.step.is_deep or not np.isfinite(ends).all():
             return None
-        lowest = moves[1:3, 2].min(axis=0)
-        top = self._tops.read(self._box(moves[1:3].swapaxes(0, 1))).max()
+        lowest = ends[:, 2].min(axis=0)
+        top = self._tops.read(self._box(ends.swapaxes(0, 1))).max()
         low = lowest < top + HIGHEST  # what is laid in this frame heaps up
         near = np.flatnonzero(np.logical_or.reduce([low.take(corner) for corner in part.corners]))
         corners = part.corners.take(near, axis=1)
-        if not corners.size:
-            return None
         used, corners = numbered(corners, len(low))
-        moves = moves.take(used, axis=2)
+        moves = around.take(part.vertices.take(used), axis=2)
+        if not moves.size or not np.isfinite(moves).all():
+            return None
         way = (moves[2] - moves[1])[:2]
         distance = np.hypot(*way) * (lowest < top).take(used)
         places, triangles = _passed(moves, corners, np.clip(distance / part.step.spacing, 1.0, MOST_POSES))

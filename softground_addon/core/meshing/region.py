@@ -40,7 +40,9 @@ class Region:
             reached = np.zeros(len(boxes), dtype=bool)
             for row in (first[:, 1], (first[:, 1] + last[:, 1]) // 2, last[:, 1]):
                 for column in (first[:, 0], (first[:, 0] + last[:, 0]) // 2, last[:, 0]):
-                    reached |= among(self._at(int(number)), keys_of(np.stack([column, row], axis=-1)))
+                    others = np.flatnonzero(~reached)
+                    keys = keys_of(np.stack([column[others], row[others]], axis=-1))
+                    reached[others] = among(self._at(int(number)), keys)
             touched[boxes] = reached
         return touched
 

@@ -50,7 +50,10 @@ class ChangesInBlocks:
         return [packed[first : first + across] for first in range(0, len(packed), across)]
 
     def within(self, window: Window) -> tuple[Array, Array]:
-        """Changes of compression and rim within a window, (T, 2, rows, columns) [m], at frames (T,) without gaps."""
+        """Changes of compression and rim within a window, (T, 2, rows, columns) [m], at frames (T,).
+
+        They are those at which anything changes there, each with the frame before it, and the first.
+        """
         whole, step = self.footprint.window, self.footprint.frame_step
         first_row, first_column = window.row - whole.row, window.column - whole.column
         near = [np.zeros((3, 0), dtype=np.int32)]
@@ -67,12 +70,14 @@ class ChangesInBlocks:
         frame = np.concatenate([compression, rim])
         start = frame[number].min()
         after = np.rint((frame - start) / step).astype(np.intp)[number]
-        count = int(after.max()) + 1
+        changes = np.unique(after)
+        needed = np.unique(np.concatenate([changes, np.maximum(changes - 1, 0)]))
+        after, count = np.searchsorted(needed, after), len(needed)
         where = (2 * after + (number >= len(compression))) * window.cells
         where += row[within] * window.columns + column[within]
         sums = np.bincount(where, weights=amount[within] * QUANTUM, minlength=count * 2 * window.cells)
         heights = np.asarray(sums, dtype=np.float64).reshape(count, 2, window.rows, window.columns)
-        return start + np.arange(count) * step, heights
+        return start + needed * step, heights
 
 
 def _blocks_along(cells: int) -> int:

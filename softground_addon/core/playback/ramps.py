@@ -130,7 +130,7 @@ def fit(frames: Array, histories: Array, tolerance: Array, ends: Array | None = 
     values[:, first] = 0.0
     values[:, first + count - 1] = of_channels[:, -1]
     values = np.round(values / QUANTUM) * QUANTUM
-    knot = _ends_of_movements(values, point)
+    knot = _ends_of_movements(values, point, (frames[number] - frames[0]) / (frames[1] - frames[0]))
     error = bend_lines(frames[number], values, point, knot, margin)
     at = np.flatnonzero(knot)
     change = np.diff(values.take(at, axis=1)).T
@@ -176,13 +176,14 @@ def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float
     return side_by_side([more, Ramps(still, start, end, whole[still])])
 
 
-def _ends_of_movements(values: Array, point: Indices) -> NDArray[np.bool_]:
-    """True where movements of points begin or end, (S,), from their values (C, S); `point` as of `bend_lines`."""
+def _ends_of_movements(values: Array, point: Indices, when: Array) -> NDArray[np.bool_]:
+    """True where movements of points begin or end, (S,), from their values (C, S); the others as of `bend_lines`."""
     moves = (np.diff(values) != 0).any(axis=0) & (np.diff(point) == 0)
     count = len(moves)
     before = np.maximum.accumulate(np.where(moves, np.arange(count), -1))
     after = np.minimum.accumulate(np.where(moves, np.arange(count), count)[::-1])[::-1]
     moving = np.zeros(count + 2, dtype=bool)
-    moving[1:-1] = (before >= 0) & (after < count) & (after - before <= REST) & (point[before] == point[after])
+    is_short = when[after] - when[before] <= REST + 0.5
+    moving[1:-1] = (before >= 0) & (after < count) & is_short & (point[before] == point[after])
     ends: NDArray[np.bool_] = moving[1:] != moving[:-1]
     return ends
