@@ -19,7 +19,7 @@ import numpy as np
 
 from ...core.carving.fineness import fineness
 from ...core.composers.pressed_shot import edit_findings
-from ...core.composers.relief_plan import with_shoe_treads
+from ...core.composers.relief_plan import broken_cells, with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
 from ...core.files import report
@@ -273,6 +273,8 @@ def write_prints(
 
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
+        broken = yield from meanwhile(now, broken_cells.slices(footprints, wanted.inputs()))
+        trail = trail.with_moved(broken)
         findings: list[Finding] = []
         if shot.surface is None:
             place = yield from _created(drafts, wanted, shot, trail)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.composers.ground_plan import GroundPlan
+from ...core.composers.relief_plan import reach_of_relief
 from ...core.ground.heightfield import FlatTerrain
 from ...core.ground.material import GroundMaterial
 from ...core.meshing.face_edges import face_edges
@@ -82,7 +83,7 @@ def laid_out(wanted: BakeSettings, plan: GroundPlan) -> Slices[Layout]:
         plan.widened(wanted.margin_m, wanted.camera),
         wanted.cell_size_m,
         wanted.unit_scale_m,
-        reach=reach_of(wanted.material),
+        reach=max(reach_of(wanted.material), reach_of_relief(wanted.inputs())),
         close_up=_close_up(wanted, plan),
     )
     return replace(layout, frame=wanted.frame)

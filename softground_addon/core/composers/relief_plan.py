@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..ground.material import GroundMaterial
 from ..ground.surfaces import SURFACES
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole
 from ..numerics.arrays import Array
+from ..numerics.cell_keys import Keys
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
-from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps
+from ..relief.broken_crust import BrokenCrust, Crust, crust_of
+from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps, seed_of
 from ..relief.tread import PATTERNS, SoleTread, of_map
 from ..settings import BakeSettings
 
@@ -44,6 +47,8 @@ UPRIGHT = 0.25
 
 TREAD = 0.003
 """Tread that the amounts of looks are given for [m]."""
+
+DAMAGED = "The stored relief of the footprints is damaged: bake again."
 
 
 def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[tuple[str, str]]:
@@ -132,12 +137,48 @@ def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> Reli
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         known, numbers, treads = False, [], {}
     if not known or not all(math.isfinite(number) and number >= 0 for number in numbers):
-        raise InputError("The stored relief of the footprints is damaged: bake again.", "damaged_record")
+        raise InputError(DAMAGED, "damaged_record")
     strength, tread = numbers
     if not strength > 0:
         return None
     looks = {step.surface: amounts.of_look(step.surface) for step in footprints if step.surface}
-    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD, looks)
+    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD, looks, crusts_of(inputs))
+
+
+def crusts_of(inputs: Mapping[str, Any]) -> dict[str, Crust]:
+    """Crusts that break around prints: see `ReliefSettings.crusts`. Of regions of one surface, the first counts.
+
+    Raises
+    ------
+    InputError
+        If the inputs say what no bake has.
+    """
+    try:
+        crusts: dict[str, Crust | None] = {}
+        for kind in (inputs, *inputs.get("regions", ())):
+            if kind.get("material") and SURFACES[kind["surface"]].melts:
+                crust = crust_of(GroundMaterial(**kind["material"]), float(inputs["gravity_m_s2"]))
+                crusts.setdefault(kind["surface"], crust)
+        return {name: crust for name, crust in {"": crusts.get(inputs.get("surface", "")), **crusts}.items() if crust}
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
+        raise InputError(DAMAGED, "damaged_record") from None
+
+
+def reach_of_relief(inputs: Mapping[str, Any]) -> float:
+    """Distance from prints to which relief moves ground that they do not move [m]."""
+    is_shown = inputs.get("relief_look") and inputs["relief_strength"] > 0
+    return max((crust.reach for crust in crusts_of(inputs).values()), default=0.0) if is_shown else 0.0
+
+
+@sliced
+def broken_cells(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Slices[Keys]:
+    """Keys of the cells in which a crust breaks around footprints, ascending, as the inputs of their bake ask."""
+    asked, cells = asked_of(inputs, footprints), [np.zeros(0, dtype=np.int64)]
+    for footprint in footprints if asked else ():
+        if asked and (crust := asked.crusts.get(footprint.surface)):
+            cells.append(BrokenCrust(footprint, crust, seed_of(footprint)).cells)
+            yield
+    return np.unique(np.concatenate(cells))
 
 
 def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tuple[str, str], SoleTread]:

@@ -247,7 +247,7 @@ def _relief_of_all(steps: Sequence[StepRelief]) -> StepRelief:
     point, place = np.unique(np.concatenate([step.point for step in steps]), return_inverse=True)
     change = np.zeros((len(point), 2))
     np.add.at(change, place, np.concatenate([step.change for step in steps]))
-    return StepRelief(point, change, np.zeros(len(point)))
+    return StepRelief(point, change, np.zeros(len(point)), plates=sum((step.plates for step in steps), ()))
 
 
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
@@ -269,15 +269,17 @@ def _relief_of_parts(
         part_of[part], within[part] = number, np.arange(len(part))
     reached: list[list[tuple[int, StepRelief]]] = [[] for _ in parts]
     for step_number, step in enumerate(relief):
-        for number in np.unique(part_of[step.point]).tolist():
+        points = np.concatenate([step.point, *(plates.point for plates in step.plates)])
+        for number in np.unique(part_of[points]).tolist():
             reached[number].append((step_number, step))
     for number in range(len(parts)):
         reliefs = [NOTHING] * len(relief)
         for step_number, step in reached[number]:
             in_part = part_of[step.point] == number
             reliefs[step_number] = replace(
-                step, point=within[step.point[in_part]], change=step.change[in_part], water=step.water[in_part]
-            )
+                step, point=within[step.point[in_part]], change=step.change[in_part], water=step.water[in_part],
+                plates=tuple(plates.at(part_of[plates.point] == number, within) for plates in step.plates),
+            )  # fmt: skip
         yield reliefs
 
 

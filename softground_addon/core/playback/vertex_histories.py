@@ -97,11 +97,17 @@ class Movements:
     error: float
 
     def with_relief(self, relief: Sequence[StepRelief]) -> VertexHistories:
-        """The vertex histories; relief of each footprint, if there is any, grows with the movement of its step."""
+        """The vertex histories; relief of each footprint, if there is any, grows with the movement of its step.
+
+        Plates of a crust move as it breaks, also where the step itself moves nothing.
+        """
         movements = []
         for number, span, ramps in self.of_footprints:
             its = relief[number] if relief else NOTHING
             movements.append(grown(ramps, its.point, its.change, span) if len(its.point) else ramps)
+        for plates in (plates for step in relief for plates in step.plates):
+            begin, end = (np.full(len(plates.point), frame) for frame in plates.frames)
+            movements.append(Ramps(plates.point, begin, end, plates.change))
         return VertexHistories(Ramps.joined(movements, 2), self.contacts, self.error)
 
 

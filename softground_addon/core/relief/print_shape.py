@@ -151,12 +151,11 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
     margin = len(kernel) // 2 + 2
     window = footprint.window.expanded(margin)
     compression, rim = (np.pad(footprint.tile(changes), margin) for changes in (footprint.pressing, footprint.rim))
-    pressed = compression[compression > 0]
-    if not len(pressed):
+    inside = inside_of(compression)
+    if not inside.any():
         return None
-    inside = compression > TOUCHED * np.percentile(pressed, NEARLY)
     far = min(int(np.ceil(REACH / size)), MOST_CELLS)
-    outline = _outline(inside, far) * size
+    outline = outline_of(inside, far) * size
     if outline.max() < NARROW * size:
         return None
     fineness = float(min(1.0, outline.max() / SHARP))
@@ -178,7 +177,13 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
     )
 
 
-def _outline(inside: Mask, far: int) -> Array:
+def inside_of(compression: Array) -> Mask:
+    """Cells that belong to a print, from the compression of its cells [m]."""
+    pressed = compression[compression > 0]
+    return np.asarray(compression > (TOUCHED * np.percentile(pressed, NEARLY) if len(pressed) else np.inf))
+
+
+def outline_of(inside: Mask, far: int) -> Array:
     """Distance of cells to the outline of a print, positive inside, up to `far` [cells]."""
     to_print, to_ground = nearest(inside, far)[0], nearest(~inside, far)[0]
     return _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0))

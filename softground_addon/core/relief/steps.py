@@ -11,12 +11,14 @@ import numpy as np
 from ..ground.display_blur import gaussian_kernel
 from ..ground.heightfield import HeightField
 from ..ground.places import Places
-from ..numerics.arrays import Array, Indices
+from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.cell_keys import cells_at
+from ..numerics.interpolation import smooth_step
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
+from .broken_crust import BrokenCrust, Crust, angular
 from .carved_lumps import lumps, lying
 from .carved_walls import room
 from .print_relief import FINEST_CRUMB, relief_of_print
@@ -25,6 +27,38 @@ from .tread import SoleTread
 
 QUANTUM = 2.0**-20
 """Step of heights [m], as of those that are played (`playback.ramps.QUANTUM`)."""
+
+
+HIDDEN = 0.012
+"""Movement of ground by what bodies carve that hides a broken crust [m]."""
+
+
+def _whole(values: Array) -> Array:
+    """Values in whole quanta."""
+    return np.asarray(np.round(values / QUANTUM) * QUANTUM)
+
+
+@dataclass(frozen=True)
+class BrokenPlates:
+    """Movement of the plates of a crust, which break all at once.
+
+    Attributes
+    ----------
+    point : (B,) int array
+        Places on them, each once.
+    change : (B, 2) float array
+        As of `StepRelief`.
+    frames : (float, float)
+        Between which they move.
+    """
+
+    point: Indices
+    change: Array
+    frames: tuple[float, float]
+
+    def at(self, chosen: Mask, number: Indices) -> BrokenPlates:
+        """Those at chosen places (B,), by other numbers of places."""
+        return BrokenPlates(number[self.point[chosen]], self.change[chosen], self.frames)
 
 
 @dataclass(frozen=True)
@@ -41,16 +75,20 @@ class StepRelief:
         Depth of the water that stands there after the step [m].
     tread : bool
         True if it includes the tread of the sole.
+    plates : tuple of BrokenPlates
+        Of a crust that the step has broken.
     """
 
     point: Indices
     change: Array
     water: Array
     tread: bool = False
+    plates: tuple[BrokenPlates, ...] = ()
 
     def scaled(self, strength: float) -> StepRelief:
         """The same with so many times the change, in whole quanta."""
-        return replace(self, change=np.round(strength * self.change / QUANTUM) * QUANTUM)
+        plates = tuple(replace(each, change=_whole(strength * each.change)) for each in self.plates)
+        return replace(self, change=_whole(strength * self.change), plates=plates)
 
 
 NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
@@ -73,6 +111,8 @@ class ReliefSettings:
         Height of the tread over that of the amounts.
     of_surfaces : mapping of str to Amounts
         Of the looks of regions.
+    crusts : mapping of str to Crust
+        That break around prints, by the surfaces of regions that have one; of the ground itself, by the empty text.
     """
 
     amounts: Amounts
@@ -80,6 +120,12 @@ class ReliefSettings:
     treads: Mapping[tuple[str, str], SoleTread] = field(default_factory=dict)
     tread_strength: float = 1.0
     of_surfaces: Mapping[str, Amounts] = field(default_factory=dict)
+    crusts: Mapping[str, Crust] = field(default_factory=dict)
+
+    def amounts_of(self, footprint: Footprint) -> Amounts:
+        """The amounts of the ground that a footprint is in."""
+        amounts, crust = self.of_surfaces.get(footprint.surface, self.amounts), self.crusts.get(footprint.surface)
+        return angular(amounts, crust) if crust else amounts
 
 
 @sliced
@@ -103,15 +149,23 @@ def relief_of_steps(
     standing, water = np.zeros((len(places.x), 2)), np.zeros(len(places.x))
     loose, lumped = lying(footprints) if len(places.x) else None, np.zeros(len(places.x))
     between = (yield from room.slices(footprints, places, blur_sigma)) if loose else None
-    steps = []
+    steps, whole = [], np.ones(len(places.x))
     for footprint in footprints:
         yield
+        crust = wanted.crusts.get(footprint.surface)
         if loose and not len(footprint.contact_cells):
             step = _carve(footprint, loose, places, lumped, water, wanted)
         else:
-            step = _step(footprint, places, standing, water, wanted, blur_sigma, between)
+            step = _step(footprint, places, standing, water, wanted, blur_sigma, between, whole if crust else None)
+        if crust:
+            step = _broken(step, BrokenCrust(footprint, crust, seed_of(footprint)), places, standing, whole, loose)
         steps.append(step.scaled(wanted.strength))
     return steps
+
+
+def seed_of(footprint: Footprint) -> int:
+    """The seed of a footprint's relief."""
+    return zlib.crc32(step_id(footprint).encode())
 
 
 def _step(
@@ -122,10 +176,11 @@ def _step(
     wanted: ReliefSettings,
     blur_sigma: float,
     between: tuple[Array, Array] | None,
+    whole: Array | None,
 ) -> StepRelief:
     """Relief of full strength that a step adds; updates the relief (K, 2) and the water (K,) at all places.
 
-    The relief stays between two heights (K,), if given.
+    The relief stays between two heights (K,), if given; of a crust, it updates the share (K,) that is `whole`.
     """
     if not len(footprint.contact_cells):
         return NOTHING
@@ -137,11 +192,11 @@ def _step(
     finest = _finest(places, point, footprint.cell_size)
     of_print = relief_of_print(
         footprint,
-        wanted.of_surfaces.get(footprint.surface, wanted.amounts),
+        wanted.amounts_of(footprint),
         blur_sigma=blur_sigma,
         finest=finest,
         in_raster=_in_raster(places, point, finest),
-        seed=zlib.crc32(step_id(footprint).encode()),
+        seed=seed_of(footprint),
         tread=tread,
         tread_strength=wanted.tread_strength,
     )
@@ -154,11 +209,40 @@ def _step(
         height = standing[point, 0] + change[:, 0]
         beyond = height - np.clip(height, *(end[point] for end in between))
         change += beyond[:, None] * (-1.0, 1.0)  # what rises less is compressed more
-    change = np.round(change / QUANTUM) * QUANTUM
+    change = _whole(change)
     standing[point] += change
     water[point] = np.maximum(water[point] * (1.0 - relief.pressed), relief.water)
+    if whole is not None:
+        whole[point] *= 1.0 - relief.pressed
     changed = change.any(axis=1)
     return StepRelief(point[changed], change[changed], water[point[changed]], of_print.has_tread)
+
+
+def _broken(
+    step: StepRelief,
+    crust: BrokenCrust,
+    places: Places,
+    standing: Array,
+    whole: Array,
+    loose: HeightField | None,
+) -> StepRelief:
+    """A step with the crust broken around it; updates the relief (K, 2) and the share (K,) that is whole.
+
+    What lies `loose` where bodies carve hides it.
+    """
+    point = places.within(crust.window, crust.cell_size) if len(places.x) else NOTHING.point
+    if not len(point):
+        return step
+    finest, bare = _finest(places, point, crust.cell_size), whole[point]
+    if loose:
+        bare = bare * smooth_step(1.0 - loose.sample(places.x[point], places.y[point]).sum(axis=0) / HIDDEN)
+    point, bare = point[bare > 0], bare[bare > 0]
+    height, on_plates = crust.at(places.x[point], places.y[point], finest)
+    change = _whole(np.stack([height * bare, np.zeros(len(point))], axis=-1))
+    standing[point] += change
+    whole[point[on_plates]] = 0.0
+    moved = change.any(axis=1)
+    return replace(step, plates=(BrokenPlates(point[moved], change[moved], crust.frames),))
 
 
 def _carve(
@@ -168,10 +252,10 @@ def _carve(
     point = places.within(carve.window, carve.cell_size)
     if not len(point):
         return NOTHING
-    amounts = wanted.of_surfaces.get(carve.surface, wanted.amounts)
+    amounts = wanted.amounts_of(carve)
     smallest = FINEST_CRUMB * _finest(places, point, carve.cell_size)
     height = lumps(carve, loose, places.x[point], places.y[point], amounts, smallest)
-    height = np.round(height / QUANTUM) * QUANTUM
+    height = _whole(height)
     change = np.where(height, height - lumped[point], 0.0)
     lumped[point] += change
     point, change = point[change != 0], change[change != 0]
@@ -195,6 +279,8 @@ def all_together(steps: Sequence[StepRelief], places: int) -> Array:
     total = np.zeros((places, 2))
     for step in steps:
         total[step.point] += step.change
+        for plates in step.plates:
+            total[plates.point] += plates.change
     return total
 
 
