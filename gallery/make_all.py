@@ -23,6 +23,7 @@ HEROES = (
     "fox_in_powder",
     "wading",
     "fox_in_deep_snow",
+    "wind_crust",
     "before_after",
     "time_lapse",
 )

@@ -19,8 +19,8 @@ from ..numerics.cell_keys import Keys
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
-from ..relief.broken_crust import BrokenCrust, Crust, crust_of
-from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps, seed_of
+from ..relief.broken_crust import REACH, plate_length
+from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps
 from ..relief.tread import PATTERNS, SoleTread, of_map
 from ..settings import BakeSettings
 
@@ -47,8 +47,6 @@ UPRIGHT = 0.25
 
 TREAD = 0.003
 """Tread that the amounts of looks are given for [m]."""
-
-DAMAGED = "The stored relief of the footprints is damaged: bake again."
 
 
 def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[tuple[str, str]]:
@@ -132,53 +130,45 @@ def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> Reli
         return None
     try:
         numbers = [float(inputs[name]) for name in ("relief_strength", "tread_m")]
-        treads = _treads_of(inputs, shod_of(inputs, footprints))
+        treads, plates = _treads_of(inputs, shod_of(inputs, footprints)), plates_of(inputs)
         known = look in SURFACES
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
-        known, numbers, treads = False, [], {}
+        known, numbers, treads, plates = False, [], {}, {}
     if not known or not all(math.isfinite(number) and number >= 0 for number in numbers):
-        raise InputError(DAMAGED, "damaged_record")
+        raise InputError("The stored relief of the footprints is damaged: bake again.", "damaged_record")
     strength, tread = numbers
     if not strength > 0:
         return None
     looks = {step.surface: amounts.of_look(step.surface) for step in footprints if step.surface}
-    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD, looks, crusts_of(inputs))
+    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD, looks, plates)
 
 
-def crusts_of(inputs: Mapping[str, Any]) -> dict[str, Crust]:
-    """Crusts that break around prints: see `ReliefSettings.crusts`. Of regions of one surface, the first counts.
-
-    Raises
-    ------
-    InputError
-        If the inputs say what no bake has.
-    """
-    try:
-        crusts: dict[str, Crust | None] = {}
-        for kind in (inputs, *inputs.get("regions", ())):
-            if kind.get("material") and SURFACES[kind["surface"]].melts:
-                crust = crust_of(GroundMaterial(**kind["material"]), float(inputs["gravity_m_s2"]))
-                crusts.setdefault(kind["surface"], crust)
-        return {name: crust for name, crust in {"": crusts.get(inputs.get("surface", "")), **crusts}.items() if crust}
-    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
-        raise InputError(DAMAGED, "damaged_record") from None
+def plates_of(inputs: Mapping[str, Any]) -> dict[str, float]:
+    """Lengths of plates: see `ReliefSettings.plates`. Of regions of one surface, the first counts."""
+    lengths: dict[str, float] = {}
+    for kind in (inputs, *inputs.get("regions", ())):
+        if kind.get("material") and SURFACES[kind["surface"]].melts:
+            material = GroundMaterial(**kind["material"])
+            lengths.setdefault(kind["surface"], plate_length(material, float(inputs["gravity_m_s2"])))
+    return {**lengths, "": lengths.get(inputs.get("surface", ""), 0.0)}
 
 
 def reach_of_relief(inputs: Mapping[str, Any]) -> float:
     """Distance from prints to which relief moves ground that they do not move [m]."""
     is_shown = inputs.get("relief_look") and inputs["relief_strength"] > 0
-    return max((crust.reach for crust in crusts_of(inputs).values()), default=0.0) if is_shown else 0.0
+    return REACH * max(plates_of(inputs).values()) if is_shown else 0.0
 
 
 @sliced
-def broken_cells(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Slices[Keys]:
-    """Keys of the cells in which a crust breaks around footprints, ascending, as the inputs of their bake ask."""
-    asked, cells = asked_of(inputs, footprints), [np.zeros(0, dtype=np.int64)]
-    for footprint in footprints if asked else ():
-        if asked and (crust := asked.crusts.get(footprint.surface)):
-            cells.append(BrokenCrust(footprint, crust, seed_of(footprint)).cells)
+def broken_cells(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Slices[tuple[Keys, Keys]]:
+    """Keys of cells in which a crust breaks around footprints, as a bake's inputs ask, and of those at cracks."""
+    asked, cells, edges = asked_of(inputs, footprints), [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for footprint in footprints:
+        if asked and (crust := asked.crust_around(footprint)):
+            cells.append(crust.cells)
+            edges.append(crust.cells[crust.is_edge])
             yield
-    return np.unique(np.concatenate(cells))
+    return np.unique(np.concatenate(cells)), np.unique(np.concatenate(edges))
 
 
 def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tuple[str, str], SoleTread]:

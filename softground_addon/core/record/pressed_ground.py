@@ -85,10 +85,10 @@ class Trail:
         """True for places (N,) where the ground has changed, to the reach of a look-up."""
         return _covers(self.touched, self.cell_size, x, y)
 
-    def with_moved(self, cells: Keys) -> Trail:
-        """The trail with further cells that moved."""
-        around = np.unique(cells[:, None] + AROUND)
-        return replace(self, touched=np.union1d(self.touched, around), moved=np.union1d(self.moved, around))
+    def with_moved(self, cells: Keys, edges: Keys) -> Trail:
+        """The trail with further cells, and those around them, that moved as planes but for their edges."""
+        touched, moved = (np.unique(keys[:, None] + AROUND) for keys in (cells, edges))
+        return replace(self, touched=np.union1d(self.touched, touched), moved=np.union1d(self.moved, moved))
 
 
 def _covers(touched: Keys, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:

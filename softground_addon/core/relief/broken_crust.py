@@ -8,7 +8,7 @@ subjected to static or quasi-static loads", Journal of Glaciology 17).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..ground.material import GroundMaterial
 from ..numerics.arrays import Array, Indices, Mask
 from ..numerics.cell_keys import keys_of
 from ..numerics.interpolation import smooth_step
-from ..record.footprints import Changes, Footprint
+from ..record.footprints import Footprint
 from .amounts import Amounts, Bend, Chunks
 from .lattice_noise import noise, uniform
 from .layers import MM, Lumps
@@ -38,6 +38,10 @@ RINGS = ((0.5, 1.0, 0.9), (1.3, 1.1, 0.25), (1.9, 0.9, 0.0))
 those that are loose. The last stands for the ground around, which holds (by eye)."""
 BAND = 0.12
 """Distance up to which such a middle is off its ring, in lengths of plates."""
+REACH = RINGS[-1][0] + BAND
+"""Distance from the hole up to which plates move, in their lengths."""
+CLOSE = 2.5
+"""Distance along an axis from a square as wide as a plate, from its middle, up to which middles are near [lengths]."""
 TILTS, SIDEWAYS = (0.04, 0.13), 0.04
 """Slopes of plates toward the hole, least and most, and across it at most (by eye)."""
 BROKEN, LOST = 0.65, (0.2, 0.45)
@@ -72,8 +76,8 @@ def ring(modulus: float, thickness: float, foundation: float) -> float:
 
     Examples
     --------
-    >>> round(ring(12e6 * (1 - POISSON**2), 0.01, 1e4 / np.pi**4), 6)
-    1.11072
+    >>> bool(np.isclose(ring(12e6 * (1 - POISSON**2), 0.01, 4.0), np.pi / 4))
+    True
     """
     rigidity = modulus * thickness**3 / (12.0 * (1.0 - POISSON**2))
     return float(np.pi / 4.0 * (4.0 * rigidity / foundation) ** 0.25)
@@ -84,39 +88,24 @@ def overhang(density: float, thickness: float, gravity: float) -> float:
     return float(np.sqrt(tensile_strength(density) * thickness / (3.0 * density * gravity)))
 
 
-@dataclass(frozen=True)
-class Crust:
-    """A crust that breaks into plates.
+def plate_length(material: GroundMaterial, gravity: float) -> float:
+    """Length from the hole to the crack around it of the plates of snow [m]; 0 of what breaks into none.
 
-    Attributes
-    ----------
-    length : float
-        Of a plate, from the hole to the crack around it [m].
+    What is soft or wet gives way without breaking, as does the paper's snow.
     """
-
-    length: float
-
-    @property
-    def reach(self) -> float:
-        """Distance from the hole up to which plates move [m]."""
-        return RINGS[-1][0] * self.length
-
-
-def crust_of(material: GroundMaterial, gravity: float) -> Crust | None:
-    """The crust of snow; None of what is soft or wet, and gives way without breaking, and of the paper's snow."""
     hardness = hardness_of(material)
     wet = material.poisson_ratio > WET * np.interp(hardness, *POISSON_RATIO)
     if material.linear or wet or not (material.crust_stress or hardness >= ONE_FINGER):
-        return None
+        return 0.0
     hard = PENCIL if material.crust_stress else hardness
     density = float(np.interp(hard, np.arange(1, 1 + len(DENSITY)), DENSITY))
     around = ring(elastic_modulus(density), THICKNESS, BOOT_STRESS / boot_depth(material))
-    return Crust(min(around, overhang(density, THICKNESS, gravity)))
+    return min(around, overhang(density, THICKNESS, gravity))
 
 
-def angular(amounts: Amounts, crust: Crust) -> Amounts:
-    """The amounts of prints in a crust: fewer crumbs, edges broken along straight lines in pieces of its plates."""
-    size = 0.5 * crust.length / MM
+def angular(amounts: Amounts, length: float) -> Amounts:
+    """The amounts of prints in a crust: fewer crumbs, edges broken along straight lines in pieces of plates."""
+    size = 0.5 * length / MM
     return replace(
         amounts,
         bends=tuple(Bend(bend.size, 0.4 * bend.amount) for bend in amounts.bends),
@@ -131,6 +120,8 @@ class BrokenCrust:
 
     Parameters
     ----------
+    length : float
+        Of its plates [m].
     seed : int
         The print's own.
 
@@ -141,12 +132,15 @@ class BrokenCrust:
     frames : (float, float)
         Scene frames between which it breaks.
     cells : (N,) int array
-        Keys of the cells in which plates are loose.
+        Keys of every other cell, along each axis, in which plates are loose.
+    is_edge : (N,) bool array
+        True for those at cracks; elsewhere, plates are plane.
     """
 
-    def __init__(self, footprint: Footprint, crust: Crust, seed: int) -> None:
-        self._seed, self.cell_size, self._length = seed, footprint.cell_size, crust.length
-        far = int(np.ceil((RINGS[-1][0] + BAND) * crust.length / self.cell_size)) + 1
+    def __init__(self, footprint: Footprint, length: float, seed: int) -> None:
+        self._seed, self.cell_size, self._length = seed, footprint.cell_size, length
+        reach = REACH * length
+        far = int(np.ceil(reach / self.cell_size)) + 1
         window = footprint.window.expanded(far)
         compression = np.pad(footprint.tile(footprint.pressing), far)
         inside = inside_of(compression)
@@ -155,35 +149,35 @@ class BrokenCrust:
         depth = float(compression[inside].mean()) if inside.any() else 0.0
         self._strength = float(smooth_step(np.array((depth / THICKNESS - SHALLOW) / (DEEP - SHALLOW))))
         x, y = window.centres(self.cell_size)
-        self._slopes = np.stack(np.gradient(out, self.cell_size)[::-1])
-        self._near = (out > 0) & (out < (RINGS[-1][0] + BAND) * crust.length)
+        self._slopes = np.stack(np.gradient(out, self.cell_size)[::-1], axis=-1)
+        self._near = (out > 0) & (out < reach)
         row, column = np.nonzero(self._near)
+        others = ((row + window.row) % 2 == 0) & ((column + window.column) % 2 == 0)
+        row, column = row[others], column[others]
         place, out = np.stack([x[column], y[row]], axis=-1), out[row, column]
         chance = uniform(seed, column + window.column, row + window.row)
         self._middles, self._is_loose = self._plates(place[order := np.argsort(chance)], out[order])
-        self._lift, self.cells = 0.0, np.zeros(0, dtype=np.int64)
+        self._lift, self.cells, self.is_edge = 0.0, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
         self._breaks = self._strength > 0 and len(self._middles) > 1
         if self._breaks:
-            plate, height = self._heights(place[:, 0], place[:, 1], 0.0)
+            plate, height, to_edge = self._heights(place[:, 0], place[:, 1], 0.0)
             loose = self._is_loose[plate]
             self._lift = -float(height.sum()) / max(1, np.count_nonzero(loose))
-            self.cells = np.unique(keys_of(np.stack([column, row], axis=-1)[loose] + self._corner))
+            self.is_edge = to_edge[loose] < self.cell_size
+            self.cells = keys_of(np.stack([column + window.column, row + window.row], axis=-1)[loose])
 
-    @property
-    def _corner(self) -> Indices:
-        return np.array([self.window.column, self.window.row], dtype=np.intp)
+    def reaches(self, x: Array, y: Array) -> Mask:
+        """True for places (N,) that are near enough to be on its plates."""
+        near: Mask = self._near[self.window.cells_under(x, y, self.cell_size)]
+        return near & self._breaks
 
     def at(self, x: Array, y: Array, finest: float) -> tuple[Array, Mask]:
-        """Change of height (N,) [m] at places, and True where a plate is loose.
+        """Change of height (N,) [m] at places that it reaches, and True where a plate is loose.
 
         `finest` is the least size that the ground shows [m].
         """
-        height, loose = np.zeros(len(x)), np.zeros(len(x), dtype=bool)
-        near = np.flatnonzero(self._near[self.window.cells_under(x, y, self.cell_size)])
-        if self._breaks and len(near):
-            plate, moved = self._heights(x[near], y[near], finest)
-            loose[near], height[near] = self._is_loose[plate], self._strength * moved
-        return height, loose
+        plate, moved, _ = self._heights(x, y, finest)
+        return self._strength * moved, self._is_loose[plate]
 
     def _plates(self, place: Array, out: Array) -> tuple[Array, Mask]:
         """Middles of plates (P, 2) and whether each is loose: in rings, of places (N, 2) in an order of chance."""
@@ -200,22 +194,32 @@ class BrokenCrust:
         self._at_hole = len(middles[1])
         return np.concatenate(middles), np.concatenate(loose)
 
-    def _heights(self, x: Array, y: Array, finest: float) -> tuple[Indices, Array]:
-        """The plate that each place (N,) is on, and its change of height [m]."""
+    def _nearest(self, place: Array) -> tuple[Indices, Indices, Array]:
+        """The plate that each place (N, 2) is on, the one beside it, and the distance to their edge [m]."""
+        both, to_edge = np.zeros((2, len(place)), dtype=np.intp), np.zeros(len(place))
+        squares = np.floor(place / self._length).astype(np.intp)
+        order = np.argsort(keys_of(squares), kind="stable")
+        for points in np.split(order, np.flatnonzero(np.diff(keys_of(squares)[order])) + 1):
+            away = np.abs(self._middles / self._length - squares[points[0]] - 0.5).max(axis=1)
+            close = np.argsort(away, kind="stable")[: max(2, np.count_nonzero(away < CLOSE))]
+            square = ((place[points][:, None] - self._middles[close]) ** 2).sum(axis=-1)
+            two = np.argpartition(square, 1, axis=1)[:, :2]
+            first, second = np.take_along_axis(square, two, axis=1).T
+            both[:, points] = close[two].T
+            between = np.linalg.norm(self._middles[both[0, points]] - self._middles[both[1, points]], axis=1)
+            to_edge[points] = (second - first) / (2.0 * between)
+        return both[0], both[1], to_edge
+
+    def _heights(self, x: Array, y: Array, finest: float) -> tuple[Indices, Array, Array]:
+        """The plate that each place (N,) is on, its change of height and its distance to a crack [m]."""
         for axis_seed, (size, amount) in enumerate(BENDS):
             bend = [amount * noise(self._seed + 60 + 2 * axis_seed + axis, size, x, y) for axis in (0, 1)]
             x, y = x + bend[0], y + bend[1]
         place = np.stack([x, y], axis=-1)
-        square = (x[:, None] - self._middles[:, 0]) ** 2 + (y[:, None] - self._middles[:, 1]) ** 2
-        each = np.arange(len(place))
-        plate = square.argmin(axis=1)
-        first = square[each, plate]
-        square[each, plate] = np.inf
-        beside = square.argmin(axis=1)
-        between = np.linalg.norm(self._middles[plate] - self._middles[beside], axis=1)
-        to_edge = (square[each, beside] - first) / (2.0 * between)
+        plate, beside, to_edge = self._nearest(place)
         chance = [uniform(self._seed + number, np.arange(len(self._middles)))[plate] for number in (71, 72, 73, 74)]
-        ahead = self._outward(plate)
+        slopes = self._slopes[self.window.cells_under(self._middles[:, 0], self._middles[:, 1], self.cell_size)]
+        ahead = (slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-9)[:, None])[plate]
         from_middle = place - self._middles[plate]
         along = (from_middle * ahead).sum(axis=1)
         across = from_middle[:, 0] * -ahead[:, 1] + from_middle[:, 1] * ahead[:, 0]
@@ -231,18 +235,13 @@ class BrokenCrust:
         width = GAPS[0] + (GAPS[1] - GAPS[0]) * pair**2
         shown = np.maximum(width, 0.55 * finest)
         gap = np.maximum(1.0 - (to_edge / shown) ** 2, 0.0) * THICKNESS * np.sqrt(width / shown)
-        return plate, np.where(loose, height, 0.0) - np.where(loose | self._is_loose[beside], gap, 0.0)
-
-    def _outward(self, plate: Indices) -> Array:
-        """Direction away from the hole at the middle of the plate of each place, (N, 2)."""
-        column, row = (np.floor(self._middles / self.cell_size).astype(np.intp) - self._corner).T
-        slope = self._slopes[:, row, column].T
-        return (slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-9)[:, None])[plate]
+        moved = np.where(loose, height, 0.0) - np.where(loose | self._is_loose[beside], gap, 0.0)
+        return plate, moved, to_edge
 
 
 def _breaking(footprint: Footprint) -> tuple[float, float]:
     """Scene frames between which a crust breaks around a footprint: as its sole goes through."""
-    changes: Changes = footprint.pressing
+    changes = footprint.pressing
     amounts = np.cumsum(np.append(changes.amounts[:], 0))[changes.first[1:] - 1]
     through = int(np.searchsorted(amounts, BROKEN_THROUGH * amounts[-1])) if len(amounts) else 0
     end = float(changes.frames[through]) if len(amounts) else footprint.start_frame

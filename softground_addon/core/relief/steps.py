@@ -18,7 +18,7 @@ from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
-from .broken_crust import BrokenCrust, Crust, angular
+from .broken_crust import BrokenCrust, angular
 from .carved_lumps import lumps, lying
 from .carved_walls import room
 from .print_relief import FINEST_CRUMB, relief_of_print
@@ -111,8 +111,8 @@ class ReliefSettings:
         Height of the tread over that of the amounts.
     of_surfaces : mapping of str to Amounts
         Of the looks of regions.
-    crusts : mapping of str to Crust
-        That break around prints, by the surfaces of regions that have one; of the ground itself, by the empty text.
+    plates : mapping of str to float
+        Length of the plates [m] that a crust breaks into, by the surfaces of regions; of the ground itself, by "".
     """
 
     amounts: Amounts
@@ -120,12 +120,17 @@ class ReliefSettings:
     treads: Mapping[tuple[str, str], SoleTread] = field(default_factory=dict)
     tread_strength: float = 1.0
     of_surfaces: Mapping[str, Amounts] = field(default_factory=dict)
-    crusts: Mapping[str, Crust] = field(default_factory=dict)
+    plates: Mapping[str, float] = field(default_factory=dict)
 
     def amounts_of(self, footprint: Footprint) -> Amounts:
         """The amounts of the ground that a footprint is in."""
-        amounts, crust = self.of_surfaces.get(footprint.surface, self.amounts), self.crusts.get(footprint.surface)
-        return angular(amounts, crust) if crust else amounts
+        amounts, length = self.of_surfaces.get(footprint.surface, self.amounts), self.plates.get(footprint.surface)
+        return angular(amounts, length) if length else amounts
+
+    def crust_around(self, footprint: Footprint) -> BrokenCrust | None:
+        """The crust that breaks around a footprint; None where there is none."""
+        length = self.plates.get(footprint.surface)
+        return BrokenCrust(footprint, length, _seed(footprint)) if length else None
 
 
 @sliced
@@ -152,18 +157,18 @@ def relief_of_steps(
     steps, whole = [], np.ones(len(places.x))
     for footprint in footprints:
         yield
-        crust = wanted.crusts.get(footprint.surface)
+        crust = wanted.crust_around(footprint) if len(places.x) else None
         if loose and not len(footprint.contact_cells):
             step = _carve(footprint, loose, places, lumped, water, wanted)
         else:
             step = _step(footprint, places, standing, water, wanted, blur_sigma, between, whole if crust else None)
         if crust:
-            step = _broken(step, BrokenCrust(footprint, crust, seed_of(footprint)), places, standing, whole, loose)
+            step = _broken(step, crust, places, standing, whole, loose)
         steps.append(step.scaled(wanted.strength))
     return steps
 
 
-def seed_of(footprint: Footprint) -> int:
+def _seed(footprint: Footprint) -> int:
     """The seed of a footprint's relief."""
     return zlib.crc32(step_id(footprint).encode())
 
@@ -196,7 +201,7 @@ def _step(
         blur_sigma=blur_sigma,
         finest=finest,
         in_raster=_in_raster(places, point, finest),
-        seed=seed_of(footprint),
+        seed=_seed(footprint),
         tread=tread,
         tread_strength=wanted.tread_strength,
     )
@@ -230,13 +235,14 @@ def _broken(
 
     What lies `loose` where bodies carve hides it.
     """
-    point = places.within(crust.window, crust.cell_size) if len(places.x) else NOTHING.point
+    point = places.within(crust.window, crust.cell_size)
+    finest = _finest(places, point, crust.cell_size) if len(point) else 0.0
+    point = point[crust.reaches(places.x[point], places.y[point]) & (whole[point] > 0)]
     if not len(point):
         return step
-    finest, bare = _finest(places, point, crust.cell_size), whole[point]
+    bare = whole[point]
     if loose:
         bare = bare * smooth_step(1.0 - loose.sample(places.x[point], places.y[point]).sum(axis=0) / HIDDEN)
-    point, bare = point[bare > 0], bare[bare > 0]
     height, on_plates = crust.at(places.x[point], places.y[point], finest)
     change = _whole(np.stack([height * bare, np.zeros(len(point))], axis=-1))
     standing[point] += change

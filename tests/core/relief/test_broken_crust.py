@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.relief_plan import broken_cells, crusts_of
+from softground_addon.core.composers.relief_plan import broken_cells, plates_of
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.field_tests import snow
 from softground_addon.core.ground.surfaces import SURFACES
@@ -15,22 +15,22 @@ from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import PressedGround, sample_at
 from softground_addon.core.relief import amounts
 from softground_addon.core.relief.broken_crust import (
+    REACH,
     THICKNESS,
-    BrokenCrust,
-    crust_of,
     elastic_modulus,
     overhang,
+    plate_length,
     ring,
     tensile_strength,
 )
 from softground_addon.core.relief.print_shape import inside_of, nearest
-from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, seed_of
+from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps
 from tests.core.relief.test_steps import around
 from tests.core.walkers import pressed, walk
 
 G = 9.81
 PACKED = snow(3.16)
-CRUST = crust_of(PACKED, G)
+CRUST = plate_length(PACKED, G)
 SIGMA = PACKED.blur_sigma
 SHOWN = {"frame": 500.0, "frame_rate": 30.0, "cell_size": 0.005, "blur_sigma": SIGMA}
 BRITTLE = {"wind-packed_snow", "crust_over_powder", "firm_snow", "piste"}
@@ -42,7 +42,7 @@ def steps(count=1):
 
 
 def relief(footprints, place, crust=CRUST, strength=1.0):
-    wanted = ReliefSettings(amounts.of_look("snow"), strength, crusts={"": crust} if crust else {})
+    wanted = ReliefSettings(amounts.of_look("snow"), strength, plates={"": crust or 0.0})
     return relief_of_steps(footprints, *place, wanted, blur_sigma=SIGMA)
 
 
@@ -80,21 +80,21 @@ def test_strength_and_stiffness_are_those_that_were_measured():
 
 
 def test_plates_are_hands_wide_and_wider_over_softer_ground():
-    over_powder = crust_of(presets.load(presets.FOLDER / "crust_over_powder.json").material, G)
-    assert 0.06 < CRUST.length < 0.12 < over_powder.length < 0.18
+    over_powder = plate_length(presets.load(presets.FOLDER / "crust_over_powder.json").material, G)
+    assert 0.06 < CRUST < 0.12 < over_powder < 0.18
 
 
 def test_only_hard_dry_snow_and_crusts_of_snow_are_brittle():
     for path in sorted(presets.FOLDER.glob("*.json")):
         preset = presets.load(path)
-        assert bool(crusts_of(inputs_of(preset.material, preset.surface))) == (path.stem in BRITTLE), path.stem
+        assert any(plates_of(inputs_of(preset.material, preset.surface)).values()) == (path.stem in BRITTLE), path.stem
 
 
 def test_a_print_that_is_no_deeper_than_its_crust_breaks_nothing():
     piste = presets.load(presets.FOLDER / "piste.json").material
     footprint = pressed(walk(steps=2), piste, 0.005)[1][0]
     assert footprint.max_depth_m < 0.04
-    assert not len(broken_cells([footprint], inputs_of(piste)))
+    assert not len(broken_cells([footprint], inputs_of(piste))[0])
 
 
 def test_plates_have_no_volume():
@@ -109,18 +109,16 @@ def test_plates_have_no_volume():
 
 def test_plates_reach_from_the_hole_to_their_laws_length_and_behind_it():
     footprint = steps()[0]
-    cells = cells_of(broken_cells([footprint], inputs_of(PACKED)))
-    crust = BrokenCrust(footprint, CRUST, seed_of(footprint))
+    cells = cells_of(broken_cells([footprint], inputs_of(PACKED))[0])
     far = 60
     window = footprint.window.expanded(far)
     distance = nearest(inside_of(np.pad(footprint.tile(footprint.pressing), far)), far)[0] * footprint.cell_size
     out = distance[cells[:, 1] - window.row, cells[:, 0] - window.column]
-    assert len(cells) == len(crust.cells)
-    assert out.max() < CRUST.reach
-    ring_of_plates = (distance > 0.2 * CRUST.length) & (distance < 0.6 * CRUST.length)
-    assert np.count_nonzero((out > 0.2 * CRUST.length) & (out < 0.6 * CRUST.length)) > 0.6 * ring_of_plates.sum()
-    behind = (distance > 1.2 * CRUST.length) & (distance < 1.5 * CRUST.length)
-    assert np.count_nonzero((out > 1.2 * CRUST.length) & (out < 1.5 * CRUST.length)) < 0.6 * behind.sum()
+    assert out.max() < REACH * CRUST
+    ring_of_plates = (distance > 0.2 * CRUST) & (distance < 0.6 * CRUST)
+    assert np.count_nonzero((out > 0.2 * CRUST) & (out < 0.6 * CRUST)) > 0.6 / 4 * ring_of_plates.sum()
+    behind = (distance > 1.2 * CRUST) & (distance < 1.5 * CRUST)
+    assert np.count_nonzero((out > 1.2 * CRUST) & (out < 1.5 * CRUST)) < 0.6 / 4 * behind.sum()
 
 
 def test_plates_lie_lower_toward_the_hole():
@@ -131,7 +129,7 @@ def test_plates_lie_lower_toward_the_hole():
     far = 60
     window = footprint.window.expanded(far)
     out = nearest(inside_of(np.pad(footprint.tile(footprint.pressing), far)), far)[0] * footprint.cell_size
-    out = out[window.cells_under(*place[:, plates.point], footprint.cell_size)] / CRUST.length
+    out = out[window.cells_under(*place[:, plates.point], footprint.cell_size)] / CRUST
     height = plates.change[:, 0]
     near, middle, edge = (np.median(height[(out > low) & (out < low + 0.2)]) for low in (0.05, 0.4, 0.7))
     assert near < middle < edge
@@ -174,8 +172,9 @@ def test_playback_has_plates_beyond_the_cells_that_the_step_moves():
 
 def test_the_trail_holds_the_cells_of_plates():
     trail = PressedGround.at(steps(), **SHOWN).trail(1e-4)
-    cells = broken_cells(steps(), inputs_of(PACKED))
-    wider = trail.with_moved(cells)
+    cells, edges = broken_cells(steps(), inputs_of(PACKED))
+    assert 0.2 * len(cells) < len(edges) < 0.6 * len(cells)
+    wider = trail.with_moved(cells, edges)
     assert wider.covers(*((cells_of(cells) + 0.5) * 0.005).T).all()
     assert np.isin(trail.moved, wider.moved).all()
     assert len(wider.moved) > len(trail.moved)
@@ -192,17 +191,21 @@ def test_a_later_step_leaves_no_plates_in_its_hole_and_breaks_none_in_an_earlier
         deep[its.point] += its.change[:, 0]
         hole = deep[plates] < -0.9 * step.max_depth_m
         assert not np.abs(both[1].plates[0].change[hole]).max(initial=0.0) > 1e-3
-    loose = BrokenCrust(first, CRUST, seed_of(first)).at(*place[:, both[0].plates[0].point], 0.005)[1]
+    loose = (
+        ReliefSettings(amounts.of_look("snow"), plates={"": CRUST})
+        .crust_around(first)
+        .at(*place[:, both[0].plates[0].point], 0.005)[1]
+    )
     assert not np.isin(plates, both[0].plates[0].point[loose]).any()
 
 
 def test_off_is_off():
     place = around(steps(), 0.005, 0.4)
-    assert not len(broken_cells(steps(), inputs_of(PACKED, look="")))
+    assert not len(broken_cells(steps(), inputs_of(PACKED, look=""))[0])
     assert not relief(steps(), place, None)[0].plates
     assert not relief(steps(), place, strength=0.0)[0].plates[0].change.any()
 
 
 @pytest.mark.parametrize("look", SURFACES)
 def test_other_surfaces_have_no_crust(look):
-    assert bool(crusts_of(inputs_of(PACKED, look))) == (look == "snow")
+    assert any(plates_of(inputs_of(PACKED, look)).values()) == (look == "snow")
