@@ -273,8 +273,9 @@ def write_prints(
 
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
-        broken = yield from meanwhile(now, broken_cells.slices(footprints, wanted.inputs()))
-        trail = trail.with_moved(*broken)
+        broken, cracks = yield from meanwhile(now, broken_cells.slices(footprints, wanted.inputs()))
+        if len(broken):
+            trail = trail.with_moved(broken, cracks)
         findings: list[Finding] = []
         if shot.surface is None:
             place = yield from _created(drafts, wanted, shot, trail)

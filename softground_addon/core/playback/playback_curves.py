@@ -276,10 +276,14 @@ def _relief_of_parts(
         reliefs = [NOTHING] * len(relief)
         for step_number, step in reached[number]:
             in_part = part_of[step.point] == number
+            plates = tuple(each.at(part_of[each.point] == number, within) for each in step.plates)
             reliefs[step_number] = replace(
-                step, point=within[step.point[in_part]], change=step.change[in_part], water=step.water[in_part],
-                plates=tuple(plates.at(part_of[plates.point] == number, within) for plates in step.plates),
-            )  # fmt: skip
+                step,
+                point=within[step.point[in_part]],
+                change=step.change[in_part],
+                water=step.water[in_part],
+                plates=plates,
+            )
         yield reliefs
 
 
