@@ -33,11 +33,6 @@ STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
 
 
-def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
-    """The context's scene, which an operator or a panel always has."""
-    return context.scene
-
-
 def scene_with(uid: int) -> bpy.types.Scene | None:
     """The scene of a session uid, also after an undo; None if it was deleted."""
     return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)

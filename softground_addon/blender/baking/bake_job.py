@@ -19,7 +19,7 @@ import numpy as np
 
 from ...core.carving.fineness import fineness
 from ...core.composers.pressed_shot import edit_findings
-from ...core.composers.relief_plan import broken_cells, with_shoe_treads
+from ...core.composers.relief_plan import asked_of, with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
 from ...core.files import report
@@ -32,6 +32,7 @@ from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.record.record import BakeRecord
+from ...core.relief.steps import with_broken
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..carried import marks_object
@@ -273,9 +274,8 @@ def write_prints(
 
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
-        broken, cracks = yield from meanwhile(now, broken_cells.slices(footprints, wanted.inputs()))
-        if len(broken):
-            trail = trail.with_moved(broken, cracks)
+        shown = asked_of(wanted.inputs(), footprints)
+        trail = yield from meanwhile(now, with_broken.slices(trail, footprints, shown))
         findings: list[Finding] = []
         if shot.surface is None:
             place = yield from _created(drafts, wanted, shot, trail)

@@ -21,7 +21,7 @@ from ...core.files import files, report
 from ...core.ground import presets
 from ...core.record import edits as step_edits
 from ...core.record.archive import LARGEST_TEXT
-from .. import further_grounds, ground_presets, jobs, settings
+from .. import further_grounds, ground_presets, jobs
 from ..baking import bake_job, clean_feet, make_keys, root_motion
 from ..characters import selection
 from ..output import export_formats
@@ -263,7 +263,7 @@ def _open(path: Path | None) -> None:
 
 def _scene(name: str | None) -> bpy.types.Scene:
     if not name:
-        return settings.scene_of(bpy.context)
+        return bpy.context.scene
     scene = bpy.data.scenes.get(name)
     if scene is None:
         known = ", ".join(f"'{scene.name}'" for scene in bpy.data.scenes)

@@ -21,7 +21,7 @@ from ...core.numerics.orientation import quaternions, without_leaps
 from ..animation_layer.layer_curves import LayerCurve, assign_action, new_action
 from ..operator_base import OperatorResult, reports_errors
 from ..rigs.object_data import armature_of, pose_bones
-from ..settings import scene_of, timeline_of, units_of
+from ..settings import timeline_of, units_of
 from ..translation import translated
 
 LARGEST = 2**29
@@ -149,7 +149,7 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
         skeleton = skeleton_of(body)
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        scene = scene_of(context)
+        scene = context.scene
         rate = timeline_of(scene).frame_rate
         first = scene.frame_start
 

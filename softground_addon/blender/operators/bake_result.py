@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from ...core.composers import responses
-from .. import session, settings
+from .. import session
 from ..baking import bake_report
 from ..characters import character_setup
 from ..ground import baked_ground, ground_mesh
@@ -67,24 +67,24 @@ class SOFTGROUND_OT_show_warnings(OnBake, Act):
     @classmethod
     def description(cls, context: bpy.types.Context, _properties: Any) -> str:
         """The warnings themselves."""
-        return "\n".join(warnings_of(settings.scene_of(context).softground.ground))
+        return "\n".join(warnings_of(context.scene.softground.ground))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> OperatorResult:
         context.window_manager.popup_menu(_draw_warnings, title=translated(self.bl_label), icon="ERROR")
         return {"FINISHED"}
 
     def act(self, context: bpy.types.Context) -> None:
-        for warning in warnings_of(settings.scene_of(context).softground.ground):
+        for warning in warnings_of(context.scene.softground.ground):
             self.report({"WARNING"}, warning)
 
 
 def _draw_warnings(menu: Any, context: bpy.types.Context) -> None:
     """One after the other, in lines that fit on a screen."""
-    for warning in warnings_of(settings.scene_of(context).softground.ground):
+    for warning in warnings_of(context.scene.softground.ground):
         column = menu.layout.column()
         for line in textwrap.wrap(warning, _WARNING_WIDTH):
             column.label(text=line, translate=False)
-        draw_remedies(column, settings.scene_of(context).softground, [warning])
+        draw_remedies(column, context.scene.softground, [warning])
 
 
 _WARNING_WIDTH = 90

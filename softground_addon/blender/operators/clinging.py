@@ -25,7 +25,7 @@ class SOFTGROUND_OT_cling(OnBake, Act):
         return super().missing(context) if character and character.armature else "Add a character first"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene, character = settings.scene_of(context), active_character(settings.options_of(context))
+        scene, character = context.scene, active_character(settings.options_of(context))
         count = waded_steps.cling(scene, character)
         self.say("{count} meshes have '{name}'", count=count, name=clinging.CLUNG)
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import bpy
 
-from .. import jobs, session, settings
+from .. import jobs, session
 from ..baking import bake_job, clean_feet, make_keys, root_motion, sink_feet
 from ..translation import translated
 from . import prediction, show_prints
@@ -50,7 +50,7 @@ class _BakeFootprints(_Pressing):
             depth=f"{totals['max_depth_m'] * 100:.1f}",
         )
         steps: Any = result.report["steps"]
-        scene = settings.scene_of(bpy.context)
+        scene = bpy.context.scene
         seen_from = "frame_end" if self._is_first else "frame_start"  # a first bake shows what a foot has left
         if steps and all(scene.frame_current < step[seen_from] for step in steps):
             if bpy.app.background:

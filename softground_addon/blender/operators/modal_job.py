@@ -75,7 +75,7 @@ class ModalJob(Act):
         return BUSY if session.current().is_baking else super().missing(context)
 
     def act(self, context: bpy.types.Context) -> None:
-        self._scene = settings.name_of(settings.scene_of(context))
+        self._scene = settings.name_of(context.scene)
         with self._changing():
             result = jobs.run(self._job_of())
         self._show(result)
@@ -102,7 +102,7 @@ class ModalJob(Act):
 
     @reports_errors
     def _start(self, context: bpy.types.Context) -> OperatorResult:
-        self._scene = settings.name_of(settings.scene_of(context))
+        self._scene = settings.name_of(context.scene)
         self._job = self._job_of()
         self._started = self._ticked = self._show_at = time.perf_counter()
         self._gave_way = False

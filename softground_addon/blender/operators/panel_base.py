@@ -121,7 +121,7 @@ class OnMeshes:
     def meshes(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """What is meant; a named object whatever it is, none if the scene has none of that name."""
         if self.object:
-            return [obj for obj in settings.scene_of(context).objects if obj.name == self.object]
+            return [obj for obj in context.scene.objects if obj.name == self.object]
         return [obj for obj in context.selected_objects if obj.type == "MESH"]
 
 

@@ -268,13 +268,13 @@ class SOFTGROUND_OT_match_depth(OnShot, Act):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
-        depth = analysis.expected_depth(settings.scene_of(context))
+        depth = analysis.expected_depth(context.scene)
         if depth:
             self.depth = depth * 100
         return context.window_manager.invoke_props_dialog(self)
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         scene.softground.material.youngs_modulus = analysis.match_depth(scene, self.depth / 100)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from mathutils import Euler, Quaternion, Vector
 from numpy.typing import NDArray
 
-from .. import settings
 from ..baking import bake_report
 from ..ground import baked_ground, baked_steps, ground_mesh
 from ..operator_base import Act, OnBake
@@ -150,7 +149,7 @@ class SOFTGROUND_OT_show_prints(OnBake, Act):
     bl_options = {"REGISTER"}
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         scene.frame_set(last_step(scene.softground))
         if _viewport(context.area):
             prints = _last_prints(scene.softground.ground, scene.frame_current)

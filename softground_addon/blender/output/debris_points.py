@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from .. import compat, settings
+from .. import compat
 from ..debris import debris_nodes as nodes
 from ..debris import debris_object
 from ..nodes.node_graph import NodeGraph
@@ -34,7 +34,7 @@ def selected(ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
     try:
         modifier: Any = obj.modifiers.new(group.name, "NODES")
         modifier.node_group = group
-        settings.scene_of(bpy.context).collection.objects.link(obj)
+        bpy.context.scene.collection.objects.link(obj)
         obj.select_set(True)
         yield
     finally:

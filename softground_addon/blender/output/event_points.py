@@ -89,7 +89,7 @@ class SOFTGROUND_OT_event_points(OnBake, Act):
 
     def act(self, context: bpy.types.Context) -> None:
         table = events_of(bake_report.heard_bakes(settings.options_of(context)))
-        shown = add_points(settings.scene_of(context), table)
+        shown = add_points(context.scene, table)
         self.say("{count} events are the points of '{name}'", count=len(table), name=shown.name)
 
 
@@ -109,7 +109,7 @@ class SOFTGROUND_OT_event_markers(OnBake, Act):
 
     def act(self, context: bpy.types.Context) -> None:
         table = events_of(bake_report.heard_bakes(settings.options_of(context)))
-        count = add_markers(settings.scene_of(context).timeline_markers, table, set(self.phases))
+        count = add_markers(context.scene.timeline_markers, table, set(self.phases))
         self.say("Marked {count} events", count=count)
 
 

@@ -66,7 +66,7 @@ Writer = Callable[[bpy.types.Object, Options], list[Path]]
 
 
 def _images(ground: bpy.types.Object, options: Options) -> list[Path]:
-    scene = settings.scene_of(bpy.context)
+    scene = bpy.context.scene
     return image_exports.export_images(
         ground,
         options.path.parent,
@@ -99,7 +99,7 @@ def _events(of: Callable[[], Callable[..., str | bytes]], *, is_timed: bool = Tr
     """A writer of the events of some frames, their times counted from the first; `is_timed` needs the frame rate."""
 
     def writer(_ground: bpy.types.Object, options: Options) -> list[Path]:
-        scene = settings.scene_of(bpy.context)
+        scene = bpy.context.scene
         rate, bakes = settings.timeline_of(scene).frame_rate, bake_report.heard_bakes(scene.softground)
         table = events.between(event_points.events_of(bakes), options.start, options.end, rate)
         content = of()(table, frame_rate=rate) if is_timed else of()(table)
@@ -111,12 +111,12 @@ def _events(of: Callable[[], Callable[..., str | bytes]], *, is_timed: bool = Tr
 
 
 def _opensim(_ground: bpy.types.Object, options: Options) -> list[Path]:
-    loads = analysis.read(settings.scene_of(bpy.context)).loads
+    loads = analysis.read(bpy.context.scene).loads
     return opensim_exports.write(loads, options.path, options.start, options.end)
 
 
 def _sound(_ground: bpy.types.Object, options: Options) -> list[Path]:
-    scene, frames = settings.scene_of(bpy.context), (options.start, options.end)
+    scene, frames = bpy.context.scene, (options.start, options.end)
     sound_exports.write(scene, options.path, *frames, samples=options.samples, stereo=options.stereo)
     return [options.path]
 
@@ -323,7 +323,7 @@ class SOFTGROUND_OT_export(OnBake, Act):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
-        scene = settings.scene_of(context)
+        scene = context.scene
         options = scene.softground
         self.frame_start, self.frame_end = options.frame_start, options.frame_end
         self.filepath = str(default_path(options.ground, self.format))
@@ -362,7 +362,7 @@ class SOFTGROUND_OT_export(OnBake, Act):
         layout.prop(self, "outdated")
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         set_frames = self.properties.is_property_set("frame_start") or self.properties.is_property_set("frame_end")
         options = scene.softground
         start, end = (self.frame_start, self.frame_end) if set_frames else (options.frame_start, options.frame_end)

@@ -21,7 +21,6 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback import vertex_histories as histories
-from .. import settings
 from ..carried import marks_object
 from ..debris import debris_object
 from ..ground import baked_ground, ground_mesh, ground_surface
@@ -40,7 +39,7 @@ def export_point_cache(ground: bpy.types.Object, path: Path, start: int, end: in
     InputError
         If there is no bake, its record is damaged, or the file cannot be written.
     """
-    unit_scale = settings.scene_of(bpy.context).unit_settings.scale_length
+    unit_scale = bpy.context.scene.unit_settings.scale_length
     display_mesh = baked_display_mesh(ground)
     rest = ground_mesh.rest_positions(ground_mesh.mesh_of(display_mesh))
     moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
@@ -167,13 +166,13 @@ def final_mesh(ground: bpy.types.Object) -> bpy.types.Object:
     for key in own_data.PROPERTIES:
         mesh.pop(key, None)
     still.matrix_world = Matrix(ground_surface.to_world_of(display_mesh, 1.0).tolist())
-    settings.scene_of(bpy.context).collection.objects.link(still)
+    bpy.context.scene.collection.objects.link(still)
     return still
 
 
 def _last_frame(ground: bpy.types.Object) -> int:
     """Last frame of the open scene, or of the bake if that is later."""
-    return math.ceil(max(settings.scene_of(bpy.context).frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
+    return math.ceil(max(bpy.context.scene.frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
 
 
 def export_final(ground: bpy.types.Object, path: Path) -> None:
@@ -184,7 +183,7 @@ def export_final(ground: bpy.types.Object, path: Path) -> None:
     InputError
         If there is no bake, or the file cannot be written.
     """
-    still, scene = final_mesh(ground), settings.scene_of(bpy.context)
+    still, scene = final_mesh(ground), bpy.context.scene
     mesh = ground_mesh.mesh_of(still)
     try:
         with _only(still, scene.frame_start, scene.frame_end), replacing(path) as partial:
@@ -242,7 +241,7 @@ def _only(
 ) -> Iterator[None]:
     """An object as all that is selected, shown if it is hidden, with its marks if these are shown, and the frames as
     those of the open scene; then all as before."""
-    scene, layer = settings.scene_of(bpy.context), bpy.context.view_layer
+    scene, layer = bpy.context.scene, bpy.context.view_layer
     layer.update()
     if display_mesh.name not in layer.objects:
         raise InputError(f"'{display_mesh.name}' is not in the current view layer: include its collection first.")
@@ -276,7 +275,7 @@ def _only(
 
 
 def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:
-    scene, result = settings.scene_of(bpy.context), set()
+    scene, result = bpy.context.scene, set()
     changed = bpy.app.handlers.frame_change_post
     with _progress(scene.frame_start, scene.frame_end) as show, written_by_blender(partial, path):
         changed.append(on_frame := lambda changing, *_: show(changing.frame_current))

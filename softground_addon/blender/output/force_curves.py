@@ -167,7 +167,7 @@ def _animate(obj: Any, name: str, frames: Array, values: Array, *, constant: boo
 
 def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
     """The record on the scene's ground, and the frames that it covers."""
-    scene = settings.scene_of(context)
+    scene = context.scene
     footprints, about = baked_ground.load(scene.softground.ground)
     first, last = about.get("inputs", {}).get("frames", (scene.softground.frame_start, scene.softground.frame_end))
     return footprints, np.arange(first, last + 1, dtype=float)
@@ -181,7 +181,7 @@ class SOFTGROUND_OT_force_curves(OnBake, Act):
     bl_label = "Add Force Curves"
 
     def act(self, context: bpy.types.Context) -> None:
-        empties = write_curves(settings.scene_of(context), *_baked(context))
+        empties = write_curves(context.scene, *_baked(context))
         for other in context.selected_objects:
             other.select_set(False)
         for empty in empties:  # the Graph Editor shows the curves of selected objects
@@ -210,7 +210,7 @@ class SOFTGROUND_OT_export_forces(OnBake, Act):
 
     def act(self, context: bpy.types.Context) -> None:
         footprints, frames = _baked(context)
-        scene = settings.scene_of(context)
+        scene = context.scene
         try:
             estimates = estimates_of(analysis.read(scene).loads, frames)
         except SoftGroundError as error:  # the record exists without its characters

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...core.errors import InputError
 from ...core.files import files
-from .. import compat, settings
+from .. import compat
 from ..operator_base import Act, OnBake, beside_file
 from ..translation import translated
 from . import sound_exports
@@ -78,14 +78,14 @@ class SOFTGROUND_OT_make_sound(OnBake, Act):
         layout.use_property_split = True
         layout.prop(self, "samples")
         layout.prop(self, "stereo")
-        if _is_others(settings.scene_of(context), beside_file(FILE)):
+        if _is_others(context.scene, beside_file(FILE)):
             layout.label(
                 text=translated("There is a {file} already", file=beside_file(FILE).name), icon="ERROR", translate=False
             )
             layout.prop(self, "replace")
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         if not bpy.data.filepath:
             raise InputError("The sound is written beside the .blend file: save the file first.")
         path, options = beside_file(FILE), scene.softground

@@ -26,7 +26,7 @@ class SOFTGROUND_OT_add_foot_lock(Act):
         return "" if has_rig else "Choose a character with an armature first"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         character = active_character(scene.softground)
         assert character is not None
         foot = _foot_at_hand(character, context.active_pose_bone)

@@ -34,7 +34,7 @@ class SOFTGROUND_PT_prints(SidebarPanel, bpy.types.Panel):
         amount = column.row()
         amount.active = options.relief != "OFF"
         amount.prop(options, "relief_strength", text="Amount", text_ctxt=CONTEXT)
-        wanted, predicted = prediction.look(settings.scene_of(context))
+        wanted, predicted = prediction.look(context.scene)
         if predicted:
             row = column.row()
             row.active = False
@@ -68,7 +68,7 @@ class SOFTGROUND_PT_of_ground(GroundPanel, bpy.types.Panel):
     bl_parent_id = ""
 
     def draw(self, context: bpy.types.Context) -> None:
-        draw_preset(self.fields(), settings.scene_of(context))
+        draw_preset(self.fields(), context.scene)
 
 
 class SOFTGROUND_PT_material(GroundPanel, bpy.types.Panel):
@@ -78,7 +78,7 @@ class SOFTGROUND_PT_material(GroundPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
+        scene = context.scene
         options = scene.softground
         column = layout.column()
         column.prop(options, "pressure")
@@ -179,7 +179,7 @@ class SOFTGROUND_PT_mesh(GroundPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
+        scene = context.scene
         options = scene.softground
         column = layout.column()
         column.prop(options.material, "surface")

@@ -90,7 +90,7 @@ class SOFTGROUND_OT_report_bug(bpy.types.Operator):
     bl_label = "Report a Bug"
 
     def execute(self, context: bpy.types.Context) -> OperatorResult:
-        context.window_manager.clipboard = bug_report(settings.scene_of(context))
+        context.window_manager.clipboard = bug_report(context.scene)
         self.report({"INFO"}, "Copied the details: paste them into your report, below what you did and what happened")
         website = program.about().get("website")
         if website:

@@ -96,12 +96,12 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
-            _scale(layout, settings.scene_of(context).unit_settings.scale_length, character)
-            _on_the_spot(layout, prediction.look(settings.scene_of(context))[1], character)
+            _scale(layout, context.scene.unit_settings.scale_length, character)
+            _on_the_spot(layout, prediction.look(context.scene)[1], character)
             layout.prop(character, "mass")
             if mass := suggested_mass(character):
                 by_volume = mass == character.skin_mass
-                _, size = import_fixes.sizes_of(settings.scene_of(context).unit_settings.scale_length, character)
+                _, size = import_fixes.sizes_of(context.scene.unit_settings.scale_length, character)
                 text = translated("{mass} kg by Volume" if by_volume else "{mass} kg by Height", mass=f"{mass:g}")
                 if by_volume and size > 0:  # one that is larger in its file than in life weighs tons
                     text = translated("{mass} kg by Volume ({size} m)", mass=f"{mass:g}", size=f"{size:.2g}")
@@ -179,7 +179,7 @@ class SOFTGROUND_PT_soles(CharacterPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
+        scene = context.scene
         character = active_character(scene.softground)
         draw_list(layout, character, "soles", "active_sole", "sole", rows=3)
         layout.operator("softground.add_contact", icon="PLUS")
@@ -246,7 +246,7 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        scene = settings.scene_of(context)
+        scene = context.scene
         options = scene.softground
         layout.prop(options, "ground", text="")
         if options.grounds:
@@ -311,7 +311,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         options = settings.options_of(context)
         summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
         if summary:
-            outdated.watch(settings.scene_of(context))
+            outdated.watch(context.scene)
         if state.is_baking:
             layout.enabled = True
             row = layout.row()
@@ -339,7 +339,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         if summary:
             bake_result.draw(column, options, summary)
         outdated_by = "; ".join(state.stale.splitlines()) if summary else ""
-        note = outdated_by or _apart_from_scene(settings.scene_of(context))
+        note = outdated_by or _apart_from_scene(context.scene)
         row = column.row()  # which is there without a note too: nothing below it moves as one comes
         row.active = False
         row.label(text=note, icon="INFO" if note else "BLANK1", translate=False)

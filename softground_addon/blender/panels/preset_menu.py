@@ -92,7 +92,7 @@ class SOFTGROUND_OT_load_preset(Act):
         except InputError as error:
             return str(error)
         lines = [preset.source] if preset.source else []
-        depth = analysis.expected_depth(settings.scene_of(context), preset.material)
+        depth = analysis.expected_depth(context.scene, preset.material)
         if depth is not None:
             who = ", ".join(
                 character_setup.title_of(c) for c in character_setup.characters_of(settings.options_of(context))
@@ -139,7 +139,7 @@ class SOFTGROUND_OT_save_preset(Act):
         name = self.name.strip()
         if not presets.bare(name):
             raise InputError("A preset needs a name with letters or digits: type one.")
-        scene = settings.scene_of(context)
+        scene = context.scene
         if _with_like_name(name, presets.FOLDER):
             raise InputError(f"'{name}' comes with SoftGround: choose another name.")
         older, path = _with_like_name(name, user_folder()), _users_file(name)

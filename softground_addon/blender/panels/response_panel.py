@@ -45,14 +45,14 @@ class SOFTGROUND_OT_tilt_preset(Act):
 
     @classmethod
     def missing(cls, context: bpy.types.Context) -> str:
-        scene = settings.scene_of(context)
+        scene = context.scene
         character, scale = active_character(scene.softground), scene.unit_settings.scale_length
         has_body = character and character.armature and character.mass > 0
         is_sized = has_body and import_fixes.sizes_of(scale, character)[0] > 0
         return "" if is_sized else "Choose a character with an armature and a mass first"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         character = active_character(scene.softground)
         body = {
             "mass": character.mass,
@@ -92,7 +92,7 @@ class SOFTGROUND_OT_response_preset(Act):
     )
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         options, wades = scene.softground, self.preset == "WADING"
         for part in settings.PERFORMANCE:
             setattr(options.grounding, part, 0.0)
@@ -135,7 +135,7 @@ class SOFTGROUND_OT_show_frame(Act):
     frame: FloatProperty(name="Frame", options={"HIDDEN"})
 
     def act(self, context: bpy.types.Context) -> None:
-        settings.scene_of(context).frame_set(int(self.frame), subframe=self.frame % 1.0)
+        context.scene.frame_set(int(self.frame), subframe=self.frame % 1.0)
 
 
 class SOFTGROUND_OT_slow_down(Act):
@@ -152,7 +152,7 @@ class SOFTGROUND_OT_slow_down(Act):
         return "" if is_known else "Bake with Sink Feet or Grounding on first: the bake suggests a speed"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         character = active_character(scene.softground)
         assert character is not None
         settings.slow_down(scene, response_job.speed_in(notes_of(character.armature)))
@@ -171,7 +171,7 @@ class _RemoveLayer(Act):
         return BUSY if session.current().is_baking else ""
 
     def act(self, context: bpy.types.Context) -> None:
-        response_job.remove_layers(settings.scene_of(context), *self.kinds)
+        response_job.remove_layers(context.scene, *self.kinds)
 
 
 class SOFTGROUND_OT_remove_root_motion(_RemoveLayer):

@@ -32,7 +32,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         layout.use_property_split = False
-        scene = settings.scene_of(context)
+        scene = context.scene
         steps, chosen = baked_steps.of(scene.softground.ground), baked_steps.chosen(scene.softground.ground)
         _list(layout, steps, chosen)
         if len(chosen) > 1:

@@ -37,7 +37,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """True if there is a bake that is not about to change."""
-        ground = settings.scene_of(context).softground.ground
+        ground = context.scene.softground.ground
         return ground is not None and not live.is_on() and baked_ground.is_baked(ground)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -51,7 +51,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
             return
         row.menu("SOFTGROUND_MT_weather", text="Presets")
         row.operator("softground.remove_weather", text="", icon="X")
-        options = settings.scene_of(context).softground
+        options = context.scene.softground
         layout.use_property_split = False  # names with units are long
         column = layout.column(align=True)
         column.active = not weather_keys.is_keyed(modifier, "Snowfall", "Time Scale")

@@ -90,7 +90,7 @@ class SOFTGROUND_OT_fix_scale(_OnCharacter, Act):
     bl_label = "Fix Import Scale"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         character = self.chosen(scene.softground)
         factor = character_setup.fix_scale(scene, character)
         self.say("'{name}' is scaled by {factor}", name=character_setup.title_of(character), factor=f"{factor:g}")
@@ -136,7 +136,7 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, Act):
     bl_label = "Add Contact"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         posed = context.object if context.mode == "POSE" else None
         if posed is not None:
             character = next((item for item in scene.softground.characters if item.armature == posed), None)

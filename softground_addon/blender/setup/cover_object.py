@@ -46,7 +46,7 @@ class SOFTGROUND_OT_cover(Act):
         return "" if is_selected else "Select the mesh to cover, in Object Mode"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene, obj = settings.scene_of(context), shot_setup.selected_ground(context)
+        scene, obj = context.scene, shot_setup.selected_ground(context)
         assert obj is not None
         if fault := ground_checks.hard_fault(obj):
             what = fault.partition(":")[0].replace(" in Hard Ground", "")

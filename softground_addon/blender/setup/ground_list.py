@@ -86,7 +86,7 @@ class SOFTGROUND_OT_choose_ground(Act):
         item = named if self.object else chosen_of(options, "grounds", "active_ground")
         if item is None or not settings.exists(item.object):
             raise InputError("Choose a ground in the list.")
-        with analysis.own_changes(settings.scene_of(context)):
+        with analysis.own_changes(context.scene):
             further_grounds.choose(options, item)
 
 
@@ -121,7 +121,7 @@ class SOFTGROUND_OT_clear_bake(_Clears, Act):
         return super().missing(context)
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         grounds = settings.listed_grounds(scene.softground)
         if self.only_shown and grounds[1:] and not baked_ground.has_remains(grounds[0]):
             raise InputError(f"There is no bake on ground '{grounds[0].name}': show another one, or clear all of them.")
@@ -151,7 +151,7 @@ class SOFTGROUND_OT_clear_unlisted(_Clears, Act):
         return super().missing(context) if has_prints else "No ground that left the list has prints"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         grounds = bake_report.unlisted(scene.softground)
         chosen = [obj for obj in grounds if self.object in ("", obj.name)]
         if not chosen:

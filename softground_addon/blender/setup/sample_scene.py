@@ -10,7 +10,7 @@ from typing import Any, cast
 import bpy
 from mathutils import Vector
 
-from .. import compat, settings
+from .. import compat
 from ..operator_base import Act
 from ..operators import show_prints
 from ..rigs.object_data import armature_of
@@ -35,7 +35,7 @@ FAR, DOWN = 5.6, radians(13)
 def add_walking_figure(context: bpy.types.Context) -> bpy.types.Object:
     """An armature with an action and a mesh on it, at the 3D cursor or beside what stands there; returns it."""
     data = json.loads(FILE.read_text(encoding="utf-8"))
-    scene = settings.scene_of(context)
+    scene = context.scene
     armature = bpy.data.objects.new("Walking Figure", bpy.data.armatures.new("Walking Figure"))
     (context.collection or scene.collection).objects.link(armature)
     armature.location = _free_place(context, scene.cursor.location)
@@ -129,7 +129,7 @@ _SOLID = ("MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "V
 
 def add_light_and_camera(context: bpy.types.Context, armature: bpy.types.Object) -> None:
     """A low sun, where there is none, and a camera on the last steps, for a scene without one or a new file."""
-    scene = settings.scene_of(context)
+    scene = context.scene
     place = armature.location + LAST_STEPS
     if not any(isinstance(obj.data, bpy.types.SunLight) for obj in scene.objects):
         sun: Any = bpy.data.lights.new("Walking Figure Sun", "SUN")

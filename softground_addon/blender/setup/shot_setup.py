@@ -299,7 +299,7 @@ class SOFTGROUND_OT_open_settings(Act):
             raise InputError(f"'{shown.name}' was deleted: undo, or remove the character with -.")
         if shown.name not in context.view_layer.objects or not shown.visible_get():
             raise InputError(f"'{shown.name}' is hidden, or excluded from this view layer: show it first.")
-        created_ground.select(settings.scene_of(context), shown)
+        created_ground.select(context.scene, shown)
         if not context.screen or not show_physics(context.screen.areas):
             self.say("Its settings are in Properties > Physics")
             if context.screen and not bpy.app.background:
@@ -337,7 +337,7 @@ class SOFTGROUND_OT_apply_look(OnGround, Act):
     bl_label = "Apply Look"
 
     def act(self, context: bpy.types.Context) -> None:
-        scene = settings.scene_of(context)
+        scene = context.scene
         options = scene.softground
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
         with analysis.own_changes(scene):
@@ -364,7 +364,7 @@ class SOFTGROUND_OT_copy_bake_command(Act):
         return "Save your changes first: the command bakes the file as it is saved" if is_changed else ""
 
     def act(self, context: bpy.types.Context) -> None:
-        context.window_manager.clipboard = bake_command(settings.scene_of(context))
+        context.window_manager.clipboard = bake_command(context.scene)
         self.report({"INFO"}, "Copied the command that bakes this shot")
 
 

@@ -60,11 +60,11 @@ def draw_shapes() -> None:
     context: Any = bpy.context
     if not panel.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
         return
-    _, predicted = prediction.look(settings.scene_of(context))
+    _, predicted = prediction.look(context.scene)
     if predicted is None:
         return
     known = predicted.analysis
-    scene = settings.scene_of(context)
+    scene = context.scene
     frame = float(scene.frame_current)
     place = partial(in_scene, scene=scene, frame=known.shot.frame)
     with blending():
@@ -126,12 +126,12 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if not (panel.show_overlay and panel.show_footfalls) or not context.space_data.overlay.show_overlays:
         return
-    _, predicted = prediction.look(settings.scene_of(context))
+    _, predicted = prediction.look(context.scene)
     if predicted is None:
         return
     known = predicted.analysis
     for number, outline in enumerate(_footfalls(known), start=1):
-        middle = in_scene(outline.middle, settings.scene_of(context), known.shot.frame)
+        middle = in_scene(outline.middle, context.scene, known.shot.frame)
         draw_number(number, middle, SIDES[outline.side], centred=True)
 
 

@@ -15,7 +15,7 @@ from mathutils import Vector
 from ...core.errors import SoftGroundError
 from ...core.numerics.arrays import Array
 from ...core.record.edits import FARTHEST, StepEdit
-from .. import jobs, session, settings
+from .. import jobs, session
 from ..baking import step_edits
 from ..ground import baked_ground, baked_steps
 from ..operator_base import Checked, OperatorResult
@@ -116,7 +116,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
 
     def _pick(self, context: bpy.types.Context, event: bpy.types.Event, region: Any, view: Any) -> OperatorResult:
         """Outline the print under the mouse, and take hold of it at a click."""
-        scene = settings.scene_of(context)
+        scene = context.scene
         if state.box:
             return self._box(scene.softground.ground, event, region, view)
         step = _under(baked_steps.of(scene.softground.ground), region, view, event) if region is not None else None
@@ -165,7 +165,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, Checked):
         self._change(context, _carried(drag.edit, by, 0.0))
 
     def _change(self, context: bpy.types.Context, edit: StepEdit) -> None:
-        drag, scene = self._drag, settings.scene_of(context)
+        drag, scene = self._drag, context.scene
         if drag is not None and edit != drag.edit:
             drag.edit, state.edits = edit, (edits := drag.edits(edit))
             if not drag.is_slow:

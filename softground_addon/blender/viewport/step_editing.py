@@ -145,7 +145,7 @@ class SOFTGROUND_OT_choose_step(OnBake, Checked):
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> OperatorResult:
-        scene = settings.scene_of(context)
+        scene = context.scene
         step = next((item for item in baked_steps.of(scene.softground.ground) if item.name == self.step), None)
         if step is None:
             return {"CANCELLED"}
@@ -174,7 +174,7 @@ class SOFTGROUND_OT_mute_step(OnStep, EditJob):
 
 def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
     """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
-    scene = settings.scene_of(context)
+    scene = context.scene
     ground = scene.softground.ground
     steps = baked_steps.of(ground)
     meshes = {
@@ -288,7 +288,7 @@ def _mesh(ground: bpy.types.Object, steps: Sequence[baked_steps.BakedStep], sole
             )
     if sole in steps[0].feet:
         return None
-    scene = settings.scene_of(bpy.context)
+    scene = bpy.context.scene
     obj = step_soles.object_of(scene.objects, sole)
     soles = mesh_soles(baked_ground.edits_of(ground))
     if obj is None and sole not in soles:
@@ -322,7 +322,7 @@ class SOFTGROUND_OT_add_step(OnStep, EditJob):
         return super().invoke(context, event)
 
     def wanted(self, ground: bpy.types.Object) -> Wanted:
-        scene, step = settings.scene_of(bpy.context), self.chosen(ground)[0]
+        scene, step = bpy.context.scene, self.chosen(ground)[0]
         cursor = from_scene(np.array(scene.cursor.location), scene, baked_steps.frame_of(ground))[:2]
         edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
         shift = scene.frame_current - int(np.ceil(step.baked.start_frame))

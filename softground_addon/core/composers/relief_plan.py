@@ -15,7 +15,6 @@ from ..ground.surfaces import SURFACES
 from ..motion.motion import CharacterMotion
 from ..motion.sole_motion import Sole
 from ..numerics.arrays import Array
-from ..numerics.cell_keys import Keys
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
@@ -157,18 +156,6 @@ def reach_of_relief(inputs: Mapping[str, Any]) -> float:
     """Distance from prints to which relief moves ground that they do not move [m]."""
     is_shown = inputs.get("relief_look") and inputs["relief_strength"] > 0
     return REACH * max(plates_of(inputs).values()) if is_shown else 0.0
-
-
-@sliced
-def broken_cells(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Slices[tuple[Keys, Keys]]:
-    """Keys of cells in which a crust breaks around footprints, as a bake's inputs ask, and of those at cracks."""
-    asked, cells, edges = asked_of(inputs, footprints), [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for footprint in footprints:
-        if asked and (crust := asked.crust_around(footprint)):
-            cells.append(crust.cells)
-            edges.append(crust.cells[crust.is_edge])
-            yield
-    return np.unique(np.concatenate(cells)), np.unique(np.concatenate(edges))
 
 
 def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tuple[str, str], SoleTread]:

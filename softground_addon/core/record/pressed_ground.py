@@ -12,7 +12,7 @@ from ..ground.display_blur import blurred, gaussian_kernel
 from ..ground.heightfield import HeightField
 from ..ground.sparse_grid import PLACES_AT_ONCE, TILE, SparseGrid, Window, side_by_side
 from ..numerics.arrays import Array
-from ..numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
+from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from ..numerics.intervals import in_order
 from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
@@ -84,11 +84,6 @@ class Trail:
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """True for places (N,) where the ground has changed, to the reach of a look-up."""
         return _covers(self.touched, self.cell_size, x, y)
-
-    def with_moved(self, cells: Keys, edges: Keys) -> Trail:
-        """The trail with further cells, and those around them, that moved as planes but for their edges."""
-        touched, moved = (np.unique(keys[:, None] + AROUND) for keys in (cells, edges))
-        return replace(self, touched=np.union1d(self.touched, touched), moved=np.union1d(self.moved, moved))
 
 
 def _covers(touched: Keys, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:

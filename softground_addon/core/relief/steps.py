@@ -12,11 +12,12 @@ from ..ground.display_blur import gaussian_kernel
 from ..ground.heightfield import HeightField
 from ..ground.places import Places
 from ..numerics.arrays import Array, Indices, Mask
-from ..numerics.cell_keys import cells_at
+from ..numerics.cell_keys import AROUND, Keys, cells_at, merged
 from ..numerics.interpolation import smooth_step
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
+from ..record.pressed_ground import Trail
 from .amounts import Amounts
 from .broken_crust import BrokenCrust, angular
 from .carved_lumps import lumps, lying
@@ -131,6 +132,28 @@ class ReliefSettings:
         """The crust that breaks around a footprint; None where there is none."""
         length = self.plates.get(footprint.surface)
         return BrokenCrust(footprint, length, _seed(footprint)) if length else None
+
+
+@sliced
+def broken_cells(footprints: Sequence[Footprint], wanted: ReliefSettings | None) -> Slices[tuple[Keys, Keys]]:
+    """Keys of cells in which a crust breaks around footprints, and of those at its cracks."""
+    broken, cracks = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for footprint in footprints:
+        if wanted and (crust := wanted.crust_around(footprint)):
+            broken.append(crust.cells)
+            cracks.append(crust.cells[crust.is_edge])
+            yield
+    return np.unique(np.concatenate(broken)), np.unique(np.concatenate(cracks))
+
+
+@sliced
+def with_broken(trail: Trail, footprints: Sequence[Footprint], wanted: ReliefSettings | None) -> Slices[Trail]:
+    """A trail with the plates of crusts that break around its footprints, which move as planes but for their cracks."""
+    broken, cracks = yield from broken_cells.slices(footprints, wanted)
+    if not len(broken):
+        return trail
+    touched, moved = (merged(*(keys + step for step in AROUND)) for keys in (broken, cracks))
+    return replace(trail, touched=merged(trail.touched, touched), moved=merged(trail.moved, moved))
 
 
 @sliced

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.relief_plan import broken_cells, plates_of
+from softground_addon.core.composers.relief_plan import asked_of, plates_of
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.field_tests import snow
 from softground_addon.core.ground.surfaces import SURFACES
@@ -24,7 +24,7 @@ from softground_addon.core.relief.broken_crust import (
     tensile_strength,
 )
 from softground_addon.core.relief.print_shape import inside_of, nearest
-from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps
+from softground_addon.core.relief.steps import ReliefSettings, all_together, broken_cells, relief_of_steps, with_broken
 from tests.core.relief.test_steps import around
 from tests.core.walkers import pressed, walk
 
@@ -94,7 +94,7 @@ def test_a_print_that_is_no_deeper_than_its_crust_breaks_nothing():
     piste = presets.load(presets.FOLDER / "piste.json").material
     footprint = pressed(walk(steps=2), piste, 0.005)[1][0]
     assert footprint.max_depth_m < 0.04
-    assert not len(broken_cells([footprint], inputs_of(piste))[0])
+    assert not len(broken_cells([footprint], asked_of(inputs_of(piste), [footprint]))[0])
 
 
 def test_plates_have_no_volume():
@@ -109,7 +109,7 @@ def test_plates_have_no_volume():
 
 def test_plates_reach_from_the_hole_to_their_laws_length_and_behind_it():
     footprint = steps()[0]
-    cells = cells_of(broken_cells([footprint], inputs_of(PACKED))[0])
+    cells = cells_of(broken_cells([footprint], asked_of(inputs_of(PACKED), [footprint]))[0])
     far = 60
     window = footprint.window.expanded(far)
     distance = nearest(inside_of(np.pad(footprint.tile(footprint.pressing), far)), far)[0] * footprint.cell_size
@@ -171,10 +171,10 @@ def test_playback_has_plates_beyond_the_cells_that_the_step_moves():
 
 
 def test_the_trail_holds_the_cells_of_plates():
-    trail = PressedGround.at(steps(), **SHOWN).trail(1e-4)
-    cells, edges = broken_cells(steps(), inputs_of(PACKED))
+    trail, shown = PressedGround.at(steps(), **SHOWN).trail(1e-4), asked_of(inputs_of(PACKED), steps())
+    cells, edges = broken_cells(steps(), shown)
     assert 0.2 * len(cells) < len(edges) < 0.6 * len(cells)
-    wider = trail.with_moved(cells, edges)
+    wider = with_broken(trail, steps(), shown)
     assert wider.covers(*((cells_of(cells) + 0.5) * 0.005).T).all()
     assert np.isin(trail.moved, wider.moved).all()
     assert len(wider.moved) > len(trail.moved)
@@ -201,7 +201,7 @@ def test_a_later_step_leaves_no_plates_in_its_hole_and_breaks_none_in_an_earlier
 
 def test_off_is_off():
     place = around(steps(), 0.005, 0.4)
-    assert not len(broken_cells(steps(), inputs_of(PACKED, look=""))[0])
+    assert not len(broken_cells(steps(), asked_of(inputs_of(PACKED, look=""), steps()))[0])
     assert not relief(steps(), place, None)[0].plates
     assert not relief(steps(), place, strength=0.0)[0].plates[0].change.any()
 
