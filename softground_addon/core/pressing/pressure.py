@@ -122,6 +122,7 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     wanted[:, 1:] *= within
     field[:, 1:] *= within
     highest = 1.0 + PEAK * np.minimum(eccentricity, KERN)
+    exactly = (x - middle[:, :1])[off], (y - middle[:, 1:])[off], share[off]
     near_x, near_y, part = near_x[off], near_y[off], part[off]
     sample = np.flatnonzero(np.arange(x.shape[1]) * GOLDEN % 1.0 < SAMPLE / x.shape[1])
     few = part[:, sample]
@@ -131,10 +132,10 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     for points in ((near_x[:, sample], near_y[:, sample], few), (near_x, near_y, part)):
         field[off] = _fitted(field[off], *points, wanted[off], highest[off], spread[off], blunt)
     bearing = np.ones(len(field))
-    bearing[off] = _force(field[off], near_x, near_y, highest[off], part)
+    bearing[off] = _force(field[off], *exactly, highest[off])
     astray = np.flatnonzero(~(np.abs(bearing[off] - 1.0) < ASTRAY))  # too few points to fit: the beam's section it is
     field[off[astray]] = linear[astray]
-    bearing[off[astray]] = _force(linear[astray], near_x[astray], near_y[astray], highest[off[astray]], part[astray])
+    bearing[off[astray]] = _force(linear[astray], *(of_points[astray] for of_points in exactly), highest[off[astray]])
     return PressureField(middle, field[:, 0] / bearing, field[:, 1:] / bearing[:, None], highest / bearing)
 
 
@@ -154,9 +155,11 @@ def spread_out(relative: Single, widening: Array) -> None:
     relative += 1.0
 
 
-def _force(field: Array, x: Single, y: Single, highest: Array, share: Single) -> Array:
-    """Part of the force that a pressure bears, (N,)."""
-    return np.asarray(np.einsum("nq,nq->n", _pressure(field, x, y, highest), share, dtype=float))
+def _force(field: Array, x: Array, y: Array, share: Array, highest: Array) -> Array:
+    """Part of the force that a pressure bears, (N,); in 64 bits, as pressures that rise within a point are steep."""
+    level, along_x, along_y = field.T[..., None]
+    pressure = _limited(level + along_x * x + along_y * y, highest[:, None])
+    return np.asarray(np.einsum("nq,nq->n", pressure, share))
 
 
 def _fitted(

@@ -125,6 +125,7 @@ def test_a_contact_on_a_line_or_on_nothing_stays_finite():
 
 @settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1))
+@example(3944644)  # pressure that rises to its limit from one point to the next
 @pytest.mark.filterwarnings("error")
 def test_contacts_of_any_shape_keep_the_force(seed):
     """Scattered points, some of them near a line, that touch on one side of a slanting edge."""
