@@ -132,10 +132,10 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     for points in ((near_x[:, sample], near_y[:, sample], few), (near_x, near_y, part)):
         field[off] = _fitted(field[off], *points, wanted[off], highest[off], spread[off], blunt)
     bearing = np.ones(len(field))
-    bearing[off] = _force(field[off], *exactly, highest[off])
+    bearing[off] = _force(field[off], highest[off], *exactly)
     astray = np.flatnonzero(~(np.abs(bearing[off] - 1.0) < ASTRAY))  # too few points to fit: the beam's section it is
     field[off[astray]] = linear[astray]
-    bearing[off[astray]] = _force(linear[astray], *(of_points[astray] for of_points in exactly), highest[off[astray]])
+    bearing[off[astray]] = _force(linear[astray], highest[off[astray]], *(of_points[astray] for of_points in exactly))
     return PressureField(middle, field[:, 0] / bearing, field[:, 1:] / bearing[:, None], highest / bearing)
 
 
@@ -155,7 +155,7 @@ def spread_out(relative: Single, widening: Array) -> None:
     relative += 1.0
 
 
-def _force(field: Array, x: Array, y: Array, share: Array, highest: Array) -> Array:
+def _force(field: Array, highest: Array, x: Array, y: Array, share: Array) -> Array:
     """Part of the force that a pressure bears, (N,); in 64 bits, as pressures that rise within a point are steep."""
     level, along_x, along_y = field.T[..., None]
     pressure = _limited(level + along_x * x + along_y * y, highest[:, None])
