@@ -232,7 +232,7 @@ class _Equations:
         Unknowns of the first equation, ascending; those of the next lie one sample later.
     gradient : (..., T, R) float array
     wanted : (..., R) float array
-        Remaining value of each.
+        Remaining value of each, of any size where it does not count.
     weight : (..., R) float array
         0 where an equation does not count.
     """
@@ -241,6 +241,11 @@ class _Equations:
     gradient: Array
     wanted: Array
     weight: Array
+
+    @property
+    def remaining(self) -> Array:
+        """What is wanted where it counts, 0 elsewhere: feet over no ground have infinite room."""
+        return np.where(self.weight, self.wanted, 0.0)
 
 
 def _solution(equations: Sequence[_Equations], change: Array) -> Array:
@@ -252,14 +257,14 @@ def _solution(equations: Sequence[_Equations], change: Array) -> Array:
         weighted, rows = each.weight * each.gradient, each.wanted.shape[-1]
         for i, column in enumerate(each.unknowns):
             columns = slice(column, column + rows * width, width)
-            right[columns] += weighted[i] * each.wanted
+            right[columns] += weighted[i] * each.remaining
             for j in range(i, len(each.unknowns)):
                 band[each.unknowns[j] - column, columns] += weighted[i] * each.gradient[j]
     return solve_banded(band, right[:, None]).reshape(change.shape)
 
 
 def _cost(equations: Sequence[_Equations]) -> Array:
-    return np.sum([np.sum(each.weight * each.wanted**2, axis=-1) for each in equations], axis=0)
+    return np.sum([np.sum(each.weight * each.remaining**2, axis=-1) for each in equations], axis=0)
 
 
 def _allowed_turn(leg: PacedLeg, pace: Array, step: float, time_scale: float) -> Array:
