@@ -92,6 +92,15 @@ def test_a_swinging_foot_does_not_give_way_into_the_ground():
     assert knee_turn(leg, spans["l"]) < PER_FRAME
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_foot_over_no_ground_gives_way_as_one_far_above_it():
+    height = np.where(np.arange(60) < 30, 0.76, 0.855)
+    far, endless = (solved({"l": leg_at(height, stands=False, room=room)})[0] for room in (10.0, np.inf))
+    assert np.abs(endless.feet["l"]).max() > 0.01
+    assert np.array_equal(endless.feet["l"], far.feet["l"])
+    assert np.array_equal(endless.hips, far.hips)
+
+
 @pytest.mark.parametrize("rate", [60.0, 120.0])
 def test_the_correction_is_about_the_same_at_any_frame_rate_that_shows_the_turn(rate):
     def hips_at(rate):
