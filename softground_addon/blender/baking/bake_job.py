@@ -266,16 +266,18 @@ def write_prints(
     weather_before = weather.before(settings.resolve(wanted.ground)) if wanted.ground else WeatherBefore()
     now, footprints, moment = Progress("write", 0.05), record.shaping, at_the_end(wanted)
 
+    asked = asked_of(wanted.inputs(), footprints)
+
     def trail_of() -> Job[tuple[list[Footprint], Trail]]:
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressed = yield from meanwhile(now, PressedGround.at.slices(footprints, **moment))
         yield now
-        return footprints, pressed.trail(trail_detail.FLOOR)
+        trail = pressed.trail(trail_detail.FLOOR)
+        return footprints, (yield from meanwhile(now, with_broken.slices(trail, footprints, asked)))
 
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
-        _, trail = yield from reused(now, "trail", (tuple(map(id, footprints)), moment), trail_of())
-        shown = asked_of(wanted.inputs(), footprints)
-        trail = yield from meanwhile(now, with_broken.slices(trail, footprints, shown))
+        compared = tuple(map(id, footprints)), moment, asked and asked.plates
+        _, trail = yield from reused(now, "trail", compared, trail_of())
         findings: list[Finding] = []
         if shot.surface is None:
             place = yield from _created(drafts, wanted, shot, trail)
