@@ -12,6 +12,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
 from . import session, settings, translation
+from .animation_layer import constraint_layer
 from .baking import bake_report
 from .carried import marks_object
 from .compat import remove_scene
@@ -134,6 +135,7 @@ def after_undo(*_: Any) -> None:
     if state.live is not None:
         live.after_undo()
     options = settings.options_of(bpy.context)
+    constraint_layer.mend_after_undo(character.armature for character in options.characters)
     _follow_deletion(options)
     _follow_weather_keys(options)
 

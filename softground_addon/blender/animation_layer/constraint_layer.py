@@ -7,10 +7,10 @@ Blender evaluates it for the constraints, and exporters leave it out.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import Enum
-from itertools import groupby
+from itertools import groupby, product
 from typing import Any, cast
 
 import bpy
@@ -152,6 +152,34 @@ def set_strength(armature: bpy.types.Object, kind: LayerKind, strength: float) -
             second.influence = strength - 1.0
 
 
+def mend_after_undo(armatures: Iterable[bpy.types.Object | None]) -> None:
+    """Point the layers of rigs at their armatures where an undo has left them pointing at the rig.
+
+    Undo reads what has changed into new memory. Where that is the memory that a layer's armature had when it was
+    removed, Blender takes the rig's pointers to the layer for pointers to the rig.
+    """
+    for armature, kind in product(filter(None, armatures), LayerKind):
+        owners = (armature, *(armature.pose.bones if armature.pose else ()))
+        lost: list[Any] = [
+            constraint
+            for owner in owners
+            for constraint in owner.constraints
+            if constraint.type == "COPY_TRANSFORMS" and constraint.target == armature and _is_of(constraint.name, kind)
+        ]
+        bones = {constraint.subtarget for constraint in lost} - {""}
+        unused = [
+            layer
+            for layer in (bpy.data.objects if lost else ())
+            if _is_of(layer.get(_KIND), kind) and not bpy.data.user_map(subset=[layer])[layer]
+        ]
+        for layer in unused:
+            if bones == set(cast("bpy.types.Armature", layer.data).bones.keys()):
+                armature[kind.value] = layer
+                for constraint in lost:
+                    constraint.target = layer
+                break
+
+
 @contextmanager
 def without_layers(armature: bpy.types.Object, lowest: LayerKind = LayerKind.RESPONSE) -> Iterator[None]:
     """The armature without its layers from one kind on; the constraints are as they were afterwards."""
@@ -184,7 +212,12 @@ def _kind_of(constraint: Any) -> LayerKind | None:
     if constraint.type != "COPY_TRANSFORMS" or constraint.is_override_data:
         return None
     name = constraint.name if constraint.target is None else constraint.target.get(_KIND)
-    return next((kind for kind in LayerKind if name and str(name).partition(".")[0] == kind.value), None)
+    return next((kind for kind in LayerKind if _is_of(name, kind)), None)
+
+
+def _is_of(name: str | None, kind: LayerKind) -> bool:
+    """True if a constraint or a layer's armature of that name is of the kind."""
+    return bool(name) and str(name).partition(".")[0] == kind.value
 
 
 def _constraints(armature: bpy.types.Object, kind: LayerKind) -> Iterator[tuple[Any, Any]]:
