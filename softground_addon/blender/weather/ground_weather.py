@@ -238,8 +238,9 @@ def _places(
         known, regions = of_bake(footprints, about)
         unit_scale = baked_ground.unit_of(about["inputs"], "unit_scale_m")
     name, frame = settings.name_of(display_mesh), baked_ground.frame_in(about["inputs"])
-    position = ground_surface.undisturbed_surface(display_mesh, unit_scale, frame=frame).vertices
-    yield READING
+    reading = ground_surface.undisturbed_surface.slices(display_mesh, unit_scale, frame=frame)
+    del display_mesh
+    position = (yield from jobs.meanwhile(READING, reading)).vertices
     display_mesh = settings.resolve(name)
     mesh, up = ground_mesh.mesh_of(display_mesh), ground_surface.up_of(display_mesh, unit_scale, frame)
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
@@ -254,6 +255,7 @@ def _places(
         footprints, position, relief, start, np.maximum(end, last), layer_depth=depth, **known
     )
     places = yield from jobs.meanwhile(READING, working)
+    yield READING
     return places.without_prints(kinds == regions.hard), regions, kinds
 
 
