@@ -11,6 +11,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +42,11 @@ AS_IT_IS = ("SoftGround", "m/s", "[Esc]")
 """Texts that are the same in all languages."""
 
 
-def shown() -> set[str]:
+@cache
+def shown() -> frozenset[str]:
     """All texts of the interface, in English; the add-on is registered."""
     texts = {text.strip() for text in (*_registered(), *_in_code(), *_in_tables())}
-    return {text for text in texts if re.search("[a-z]{2}", text) and text not in AS_IT_IS}
+    return frozenset(text for text in texts if re.search("[a-z]{2}", text) and text not in AS_IT_IS)
 
 
 def _registered() -> Iterator[str]:

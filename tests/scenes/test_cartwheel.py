@@ -86,6 +86,7 @@ def test_limbs_can_bear_the_forces(body, motion):
     assert force.max() < 2.2
 
 
+@pytest.mark.slow
 def test_hands_lie_on_the_ground_and_nothing_goes_through_it(scene):
     import bpy
 

@@ -22,6 +22,7 @@ def walker(scene):
     return shoes, motion
 
 
+@pytest.mark.slow
 def test_a_planted_snowshoe_lies_still_and_flat_and_a_swinging_one_is_lifted(walker, scene):
     import bpy
 

@@ -101,7 +101,7 @@ def misses(animal: Animal) -> list[str]:
 @pytest.mark.parametrize(
     ("first", "count", "right"),
     [
-        pytest.param(0, 6, 1.0),
+        pytest.param(0, 6, 1.0, marks=pytest.mark.slow),
         pytest.param(12, 50, 0.96, marks=pytest.mark.slow),
         pytest.param(1000, 1000, 0.98, marks=pytest.mark.marathon),
     ],

@@ -161,6 +161,7 @@ def test_at_chosen_roots_it_is_the_closed_form(shot, kind):
     assert angles(obj)[1] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_roots_sink_with_the_ground_and_where_they_follow_it_they_do_not(shot, kind):
     place = roots()

@@ -153,7 +153,7 @@ def crawler(scene):
     ("mover", "snow"),
     [
         pytest.param(runner, {**DEEP, "youngs_modulus": 300e3}, marks=pytest.mark.slow),
-        (dog, {**DEEP, "youngs_modulus": 200e3}),
+        pytest.param(dog, {**DEEP, "youngs_modulus": 200e3}, marks=pytest.mark.slow),
         pytest.param(crawler, {**DEEP, "youngs_modulus": 60e3}, marks=pytest.mark.slow),
     ],
 )

@@ -64,6 +64,7 @@ def places(evaluated):
     return at.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("foot", ["free", "chain"])
 def test_all_four_paws_stand_in_their_prints_and_press_as_they_do_without(addon, foot):
     wanted, reports, gaps = animal(foot=foot), {}, {}

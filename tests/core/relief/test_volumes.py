@@ -52,7 +52,9 @@ def prints(look, kind):
 
 
 @pytest.mark.parametrize("spacing", [0.0025, 0.005])
-@pytest.mark.parametrize("kind", ["boot", "bare", "paw", "hoof", "wheel"])
+@pytest.mark.parametrize(
+    "kind", ["boot", "paw", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("bare", "hoof", "wheel"))]
+)
 @pytest.mark.parametrize("look", SURFACES)
 def test_each_print_keeps_its_volume_to_a_percent(look, kind, spacing):
     blur = MATERIALS[look].blur_sigma
