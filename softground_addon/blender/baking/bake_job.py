@@ -19,7 +19,7 @@ import numpy as np
 
 from ...core.carving.fineness import fineness
 from ...core.composers.pressed_shot import edit_findings
-from ...core.composers.relief_plan import asked_of, with_shoe_treads
+from ...core.composers.relief_plan import asked_of, reach_of_relief, with_shoe_treads
 from ...core.composers.responses import response_findings, suggested_speeds, worst_gaps
 from ...core.debris.debris import Debris
 from ...core.files import report
@@ -355,7 +355,7 @@ def _given(
     reading = trail_detail.coarsest.slices(name, surface, unit_scale, cell_size, frame)
     coarse, level = yield from meanwhile(Progress("write", 0.1), reading)
     fine = Region(trail.moved, cell_size), cell_size, closer
-    if wanted.relief == "OFF":
+    if closer is None and not reach_of_relief(wanted.inputs()):  # cracks of a crust are as fine as cells
         fine = fineness(trail.moved, footprints, cell_size)
     refinement = yield from meanwhile(Progress("write", 0.1), refine.slices(coarse, *fine))
     drafting = trail_detail.draft.slices(drafts, settings.resolve(name), coarse, refinement, level)

@@ -1,4 +1,4 @@
-"""How fine a mesh shows ground that bodies carve: without relief, no finer than it may be off while it moves."""
+"""How fine a mesh shows ground that bodies carve, but for close-ups: no finer than it may be off while it moves."""
 
 from __future__ import annotations
 

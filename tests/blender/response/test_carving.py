@@ -431,3 +431,15 @@ def test_without_sunk_feet_nothing_is_carved(scene):
     report, record_of_bake = bake(scene)
     assert not record_of_bake.carves
     assert "carved" not in report
+
+
+@pytest.mark.slow
+def test_relief_but_for_a_close_up_needs_no_finer_mesh_where_only_bodies_carve(scene):
+    walker(scene, **DEEP)
+    field(scene)
+    options, vertices = scene.softground, {}
+    options.cell_size = CELL / 2
+    for options.relief in ("OFF", "FINE", "CLOSE_UP"):
+        bake(scene)
+        vertices[options.relief] = len(baked_ground.display_mesh_of(options.ground).data.vertices)
+    assert vertices["OFF"] == vertices["FINE"] < 0.7 * vertices["CLOSE_UP"]
