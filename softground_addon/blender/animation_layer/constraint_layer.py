@@ -159,14 +159,16 @@ def mend_after_undo(armatures: Iterable[bpy.types.Object | None]) -> None:
     removed, Blender takes the rig's pointers to the layer for pointers to the rig.
     """
     for armature, kind in product(filter(None, armatures), LayerKind):
-        owners = (armature, *(armature.pose.bones if armature.pose else ()))
         lost: list[Any] = [
-            constraint
-            for owner in owners
+            (
+                constraint,
+                constraint.subtarget or ("" if owner == armature else owner.name),
+            )  # Blender clears its own name
+            for owner in (armature, *(armature.pose.bones if armature.pose else ()))
             for constraint in owner.constraints
             if constraint.type == "COPY_TRANSFORMS" and constraint.target == armature and _is_of(constraint.name, kind)
         ]
-        bones = {constraint.subtarget for constraint in lost} - {""}
+        bones = {bone for _, bone in lost} - {""}
         unused = [
             layer
             for layer in (bpy.data.objects if lost else ())
@@ -175,8 +177,8 @@ def mend_after_undo(armatures: Iterable[bpy.types.Object | None]) -> None:
         for layer in unused:
             if bones == set(cast("bpy.types.Armature", layer.data).bones.keys()):
                 armature[kind.value] = layer
-                for constraint in lost:
-                    constraint.target = layer
+                for constraint, bone in lost:
+                    constraint.target, constraint.subtarget = layer, bone
                 break
 
 

@@ -12,6 +12,7 @@ from softground_addon.blender.ground import baked_ground, ground_surface
 from softground_addon.blender.live import live
 from softground_addon.blender.playback import playback
 from softground_addon.core.playback.ramps import TOLERANCE
+from softground_addon.core.playback.vertex_histories import CARVED_TOLERANCE
 from softground_addon.core.record.pressed_ground import PressedGround
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -180,6 +181,8 @@ class ArtistAtWork(RuleBasedStateMachine):
         ground = self.options.ground
         display_mesh = baked_ground.display_mesh_of(ground)
         footprints, about = baked_ground.load(ground)
+        is_carved = not all(len(footprint.contact_cells) for footprint in footprints)
+        allowed = TOLERANCE + CARVED_TOLERANCE * is_carved
         rest = ground_surface.rest_vertices(display_mesh, 1.0)
         cell = about["inputs"]["cell_size_m"]
         for frame in (FRAMES, 9.0, 14.5, 0.0):
@@ -193,7 +196,7 @@ class ArtistAtWork(RuleBasedStateMachine):
                 blur_sigma=baked_ground.baked_with(about, "blur_sigma"),
             )
             recorded = pressed.sample(*rest[:, :2].T).display
-            assert np.abs(shown - rest[:, 2] - recorded).max() <= TOLERANCE + 1e-5
+            assert np.abs(shown - rest[:, 2] - recorded).max() <= allowed + 1e-5
 
     def teardown(self):
         if live.is_on():
