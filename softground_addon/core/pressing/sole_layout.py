@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..ground.sparse_grid import Window
 from ..ground.variation import Factors, layer_factors
@@ -98,13 +100,19 @@ class SoleLayout(ContactLayout):
         if material.poisson_ratio:
             rim = rim_weights(coverage, contact, cells.rim_reach, cells.surface(window).bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed, plate)
-        stress = self._stress(steps, window, cells, sinking, area * fraction, plate)
+        # Of the pressure on a plate, the highest counts wherever it is.
+        under = window if plate else self._under(start, end, cells.cell_size)
+        stress = self._stress(steps, under, cells, sinking, area * fraction, plate)
         if factors and stress.ndim == 1:
             stress = stress[:, None, None]
         target = sinking.target
+        holds = stress < material.crust_stress if material.crust_stress else None
         if stress.ndim > 1:
-            target = target_compression(stress, material, firmness=firmness, **layer_factors(factors))
-            target = plate.depth(target) if plate else target
+            inside = window.slices(under)
+            of_cells = {name: of[inside] for name, of in layer_factors(factors).items()}
+            target = target_compression(stress, material, firmness=firmness, **of_cells)
+            target = _over_all(plate.depth(target) if plate else target, inside, coverage.shape)
+            holds = None if holds is None else _over_all(holds, inside, coverage.shape)
         return Imprints(
             start,
             1,
@@ -115,7 +123,7 @@ class SoleLayout(ContactLayout):
             pressing,
             target,
             np.broadcast_to(rate, sinking.target.shape),
-            stress < material.crust_stress if material.crust_stress else None,
+            holds,
             factors,
             sinking.reached,
             Loads(
@@ -192,3 +200,10 @@ class SoleLayout(ContactLayout):
     def _middles(self, poses: Array) -> Array:
         area = np.concatenate([patch.area for patch in self.points.patches])
         return centroid(self.points, poses, area[None])
+
+
+def _over_all(values: NDArray[Any], part: tuple[slice, slice], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Values of a part of the cells at each of N steps, over all cells (N, rows, columns): 0 beyond it."""
+    whole = np.zeros(shape, values.dtype)
+    whole[:, *part] = values
+    return whole

@@ -224,13 +224,13 @@ class FootprintRecorder:
         self._frames.append(frame)
         self._windows.append(window)
         self._contacts.append(np.flatnonzero(touched))
-        storable = np.minimum(np.maximum(change, -LARGEST_AMOUNT), LARGEST_AMOUNT)
+        largest = max(int(change.max(initial=0)), -int(change.min(initial=0)))
+        storable = change if largest <= LARGEST_AMOUNT else np.clip(change, -LARGEST_AMOUNT, LARGEST_AMOUNT)
         for channel, values in zip(self._changes, storable.reshape(2, -1), strict=True):
             cells = np.flatnonzero(values)
             channel.append((cells, values[cells].astype(np.int32)))
-        rest = change - storable
-        if rest.any():
-            self.add(frame, window, rest, touched)
+        if storable is not change:
+            self.add(frame, window, change - storable, touched)
 
     def footprint(self, **other_fields: Any) -> Footprint:
         """The footprint so far.
