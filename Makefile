@@ -93,8 +93,8 @@ test: $(READY)
 	$(PYTEST) -m "$(QUICK) and alone" $(TESTS) || [ $$? -eq 5 ]
 
 slow: $(READY)
-	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not alone" $(TESTS)
-	$(PYTEST) -m "slow and alone" $(TESTS) || [ $$? -eq 5 ]
+	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not marathon and not alone" $(TESTS)
+	$(PYTEST) -m "slow and not marathon and alone" $(TESTS) || [ $$? -eq 5 ]
 
 # One file baked in each Blender that is here, played in the others.
 versions: $(READY)

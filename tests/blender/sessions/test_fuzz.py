@@ -49,12 +49,12 @@ HANG_S = 20
 """What an input may take [s of the processor, so that a busy machine decides nothing]."""
 
 
-def counts(whole, quick=QUICK):
-    """Few inputs in the quick tests, a twentieth in the slow ones, all in the marathon."""
+def counts(whole, *quick):
+    """A twentieth of the inputs in the slow tests, all in the marathon, and maybe a few in the quick tests."""
     WHOLE.append(whole)
     return pytest.mark.parametrize(
         "count",
-        [quick, pytest.param(whole // 20, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
+        [*quick, pytest.param(whole // 20, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
     )
 
 
@@ -123,7 +123,7 @@ def mutated(content):
     )
 
 
-@counts(8000)
+@counts(8000, QUICK)
 def test_no_preset_file_makes_a_traceback(count, tmp_path):
     path = tmp_path / "fuzz.json"
     valid = (presets.FOLDER / "snow.json").read_bytes()
@@ -138,7 +138,7 @@ def test_no_preset_file_makes_a_traceback(count, tmp_path):
     each(mutated(valid) | st.binary(max_size=64), count, check)
 
 
-@counts(8000)
+@counts(8000, QUICK)
 def test_no_manifest_file_makes_a_traceback(count, tmp_path):
     (tmp_path / "a.blend").touch()
     valid = (
@@ -172,7 +172,7 @@ def aliases(name):
     ])  # fmt: skip
 
 
-@counts(5000)
+@counts(5000, QUICK)
 def test_no_result_of_a_batch_takes_the_place_of_anything_else(count, tmp_path):
     for folder in ("shots", "out"):
         (tmp_path / folder).mkdir()
@@ -225,7 +225,7 @@ def rezipped(content, name, change, method=zipfile.ZIP_STORED):
     return buffer.getvalue()
 
 
-@counts(3500)
+@counts(3500, QUICK)
 def test_no_record_makes_a_traceback(count, stored):
     with zipfile.ZipFile(io.BytesIO(stored)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
@@ -332,7 +332,7 @@ def forged_by_member(stored):
     return changed.map(put_together)
 
 
-@counts(20_000)
+@counts(20_000, QUICK)
 @pytest.mark.timeout(3600)
 def test_a_record_forged_by_member_is_read_within_its_bounds_or_refused(count, stored):
     def check(content):
@@ -351,7 +351,7 @@ def test_a_record_forged_by_member_is_read_within_its_bounds_or_refused(count, s
     each(forged_by_member(stored), count, check)
 
 
-@counts(1000)
+@counts(1000, QUICK)
 @pytest.mark.timeout(3600)
 def test_steps_of_a_forged_record_are_pressed_again_or_refused(count, stored):
     with zipfile.ZipFile(io.BytesIO(stored)) as archive:
@@ -390,8 +390,7 @@ def felt(addon, tmp_path_factory):
     return path
 
 
-@pytest.mark.slow
-@counts(1000, quick=10)
+@counts(1000)
 @pytest.mark.timeout(3600)
 def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
     bpy.ops.wm.open_mainfile(filepath=str(felt))
@@ -514,7 +513,6 @@ PROPERTY_VALUES = st.one_of(
 )
 
 
-@pytest.mark.slow
 @counts(5000)
 @pytest.mark.timeout(3600)
 def test_no_stored_property_makes_a_traceback(count, forgeable):
@@ -634,7 +632,6 @@ VALUES = st.one_of(
 )
 
 
-@pytest.mark.slow
 @counts(500)
 @pytest.mark.timeout(3600)
 def test_no_command_line_makes_a_traceback_or_changes_the_shot(count, addon, tmp_path, monkeypatch, capfd):
