@@ -159,11 +159,9 @@ def mend_after_undo(armatures: Iterable[bpy.types.Object | None]) -> None:
     removed, Blender takes the rig's pointers to the layer for pointers to the rig.
     """
     for armature, kind in product(filter(None, armatures), LayerKind):
+        # Of a bone's constraint that points at the bone itself, Blender may have cleared the name.
         lost: list[Any] = [
-            (
-                constraint,
-                constraint.subtarget or ("" if owner == armature else owner.name),
-            )  # Blender clears its own name
+            (constraint, constraint.subtarget or ("" if owner == armature else owner.name))
             for owner in (armature, *(armature.pose.bones if armature.pose else ()))
             for constraint in owner.constraints
             if constraint.type == "COPY_TRANSFORMS" and constraint.target == armature and _is_of(constraint.name, kind)
