@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import Enum
-from itertools import groupby, product
+from itertools import groupby
 from typing import Any, cast
 
 import bpy
@@ -158,26 +158,31 @@ def mend_after_undo(armatures: Iterable[bpy.types.Object | None]) -> None:
     Undo reads what has changed into new memory. Where that is the memory that a layer's armature had when it was
     removed, Blender takes the rig's pointers to the layer for pointers to the rig.
     """
-    for armature, kind in product(filter(None, armatures), LayerKind):
-        # Of a bone's constraint that points at the bone itself, Blender may have cleared the name.
-        lost: list[Any] = [
-            (constraint, constraint.subtarget or ("" if owner == armature else owner.name))
-            for owner in (armature, *(armature.pose.bones if armature.pose else ()))
-            for constraint in owner.constraints
-            if constraint.type == "COPY_TRANSFORMS" and constraint.target == armature and _is_of(constraint.name, kind)
+    for armature in filter(None, armatures):
+        turned = [
+            (owner, constraint)
+            for owner, constraint in _all_constraints(armature)
+            if constraint.type == "COPY_TRANSFORMS" and constraint.target == armature
         ]
-        bones = {bone for _, bone in lost} - {""}
-        unused = [
-            layer
-            for layer in (bpy.data.objects if lost else ())
-            if _is_of(layer.get(_KIND), kind) and not bpy.data.user_map(subset=[layer])[layer]
-        ]
-        for layer in unused:
-            if bones == set(cast("bpy.types.Armature", layer.data).bones.keys()):
-                armature[kind.value] = layer
-                for constraint, bone in lost:
-                    constraint.target, constraint.subtarget = layer, bone
-                break
+        for kind in LayerKind:
+            # Of a bone's constraint that points at the bone itself, Blender may have cleared the name.
+            lost: list[Any] = [
+                (constraint, constraint.subtarget or ("" if owner == armature else owner.name))
+                for owner, constraint in turned
+                if _is_of(constraint.name, kind)
+            ]
+            bones = {bone for _, bone in lost} - {""}
+            unused = [
+                layer
+                for layer in (bpy.data.objects if lost else ())
+                if _is_of(layer.get(_KIND), kind) and not bpy.data.user_map(subset=[layer])[layer]
+            ]
+            for layer in unused:
+                if bones == set(cast("bpy.types.Armature", layer.data).bones.keys()):
+                    armature[kind.value] = layer
+                    for constraint, bone in lost:
+                        constraint.target, constraint.subtarget = layer, bone
+                    break
 
 
 @contextmanager
@@ -222,8 +227,13 @@ def _is_of(name: str | None, kind: LayerKind) -> bool:
 
 def _constraints(armature: bpy.types.Object, kind: LayerKind) -> Iterator[tuple[Any, Any]]:
     """The constraints of a layer, each with its bone or object."""
+    return ((owner, constraint) for owner, constraint in _all_constraints(armature) if _kind_of(constraint) is kind)
+
+
+def _all_constraints(armature: bpy.types.Object) -> Iterator[tuple[Any, Any]]:
+    """All constraints of an armature, each with its bone or object."""
     for owner in (armature, *(armature.pose.bones if armature.pose else ())):
-        yield from ((owner, constraint) for constraint in owner.constraints if _kind_of(constraint) is kind)
+        yield from ((owner, constraint) for constraint in owner.constraints)
 
 
 def _layer_on(armature: bpy.types.Object, kind: LayerKind) -> Any:
